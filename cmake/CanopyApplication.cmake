@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+# canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
+#                        [INCLUDE state_types.h] [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
+#
+# Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
+# generated tables, the codec, and your leaves. Link it, and a CAN and a clock driver, into your program:
+#
+#   canopy_add_application(nao_home TREE trees/get_home.xml DBC nao.dbc NODE Controller PERIOD_MS 50 LEAVES home_leaves.c)
+#   add_executable(nao_home main.c)
+#   target_link_libraries(nao_home PRIVATE nao_home_application canopy_clock_posix)
+#
+# The generated files, the model file for the host tools among them, are in
+# ${CMAKE_CURRENT_BINARY_DIR}/generated/NAME.
+include_guard(GLOBAL)
+
+include(Python) # CANOPY_PYTHON
+
+# A change of the compiler compiles every application again.
+file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
+     "${PROJECT_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${PROJECT_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
+     "${PROJECT_SOURCE_DIR}/runtime/include/canopy/nodes.def")
+
+function(canopy_add_application NAME)
+  cmake_parse_arguments(PARSE_ARGV 1 APP "" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH" "LEAVES")
+  foreach(required TREE DBC NODE PERIOD_MS LEAVES)
+    if(NOT APP_${required})
+      message(FATAL_ERROR "canopy_add_application(${NAME}): ${required} is missing")
+    endif()
+  endforeach()
+  if(APP_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "canopy_add_application(${NAME}): unknown arguments: ${APP_UNPARSED_ARGUMENTS}")
+  endif()
+  cmake_path(ABSOLUTE_PATH APP_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+  cmake_path(ABSOLUTE_PATH APP_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+  cmake_path(GET APP_DBC STEM bus)
+  cmake_path(GET APP_DBC FILENAME dbc_name)
+  string(TOLOWER "${bus}" bus)
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
+  set(sources "${folder}/${NAME}.c" "${folder}/${bus}_bus.c")
+  set(headers "${folder}/${NAME}.h" "${folder}/${NAME}_leaves.h" "${folder}/${bus}_bus.h")
+  set(options "")
+  foreach(option INCLUDE BITRATE MAX_RAM MAX_FLASH)
+    if(APP_${option})
+      string(TOLOWER "${option}" flag)
+      string(REPLACE "_" "-" flag "${flag}")
+      list(APPEND options "--${flag}" "${APP_${option}}")
+    endif()
+  endforeach()
+  add_custom_command(
+    OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"
+    COMMAND "${CANOPY_PYTHON}" -m canopy compile "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
+            --period-ms "${APP_PERIOD_MS}" --output "${folder}" ${options}
+    DEPENDS "${APP_TREE}" "${APP_DBC}" ${CANOPY_COMPILER_SOURCES}
+    COMMENT "canopy compile ${NAME}"
+    VERBATIM)
+  add_library(${NAME}_application STATIC ${sources} ${headers} ${APP_LEAVES})
+  target_include_directories(${NAME}_application PUBLIC "${folder}" PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  target_link_libraries(${NAME}_application PUBLIC canopy_runtime PRIVATE canopy_warnings)
+endfunction()

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""The command `canopy`. Subcommands are imported when they are called, so that each needs only its own libraries."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import click
+
+from canopy import __version__
+
+# Name -> module that holds the click command `command`, and the line shown in --help.
+SUBCOMMANDS = {
+    "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "demo": ("canopy.demo", "Run the NAO example in the terminal."),
+    "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
+    "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),
+    "spy": ("canopy.spy", "Start lcm-spy with Canopy's message types."),
+}
+
+
+class _LazyGroup(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(SUBCOMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in SUBCOMMANDS:
+            return None
+        module = SUBCOMMANDS[cmd_name][0]
+        try:
+            command = importlib.import_module(module).command
+        except ModuleNotFoundError as error:
+            if error.name is None or error.name.startswith("canopy"):
+                raise
+            extra = "can" if error.name == "can" else error.name
+            click.echo(
+                f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
+            )
+            sys.exit(1)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in SUBCOMMANDS.items()])
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="canopy")
+def main() -> None:
+    """Behaviour trees as robot firmware: compile them, and watch them run.
+
+    \b
+    Examples:
+      canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o generated
+      canopy monitor --model generated/get_home.model.json --can socketcan:vcan0
+    """

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""What an application costs: RAM and constant tables on a 32-bit target, leaf calls in the worst tick, bus load.
+
+RAM and flash are those of the generated tables and of the one static object; the sizes of the user's own state types
+are not known here, and code is not counted: `make sizes` measures the linked whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+from canopy.compiler.bus_reader import Bus, Message
+from canopy.compiler.table import Table
+
+# (size, alignment) on a 32-bit target with 8-byte alignment of 64-bit integers: Arm EABI and RISC-V ILP32.
+SIZES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
+SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4}
+
+
+def struct_size(members: Iterable[tuple[int, int]]) -> tuple[int, int]:
+    """(size, alignment) of a struct of members given as (size, alignment)."""
+    size, alignment = 0, 1
+    for member_size, member_alignment in members:
+        size = -(-size // member_alignment) * member_alignment + member_size
+        alignment = max(alignment, member_alignment)
+    return -(-size // alignment) * alignment, alignment
+
+
+def scalar(c_type: str) -> tuple[int, int]:
+    """(size, alignment) of a scalar type."""
+    return SIZES[c_type], SIZES[c_type]
+
+
+def array(element: tuple[int, int], count: int) -> tuple[int, int]:
+    """(size, alignment) of an array."""
+    return element[0] * count, element[1]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The figures that are printed and written to the model file."""
+
+    ram_bytes: int
+    flash_bytes: int
+    nodes: int
+    worst_tick_leaf_calls: int
+    max_depth: int
+    can_load_percent: float
+    bitrate: int
+
+    def as_dict(self) -> dict[str, float]:
+        """For the model file."""
+        return asdict(self)
+
+
+def _message_struct(message: Message, *, received: bool) -> tuple[int, int]:
+    return struct_size([*(scalar(s.c_type) for s in message.signals), *([scalar("bool")] if received else [])])
+
+
+def ram_bytes(table: Table, bus: Bus) -> int:
+    """Size of the application's static object: the struct that the template application.c.j2 declares."""
+    u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
+    nodes = len(table.rows)
+    outputs = sum(len(message.signals) for message in bus.send)
+    instance = struct_size([*[pointer] * 4, u64, u32, u16])
+    bus_state = struct_size([*[pointer] * 5, *[u32] * 9])
+    trace_state = struct_size([pointer, u16, u8, u32])
+    rx_state = struct_size([u64, *[u8] * 4])
+    image_in = struct_size([u64, *(_message_struct(m, received=True) for m in bus.receive)])
+    image_out = struct_size(
+        [array(u32, max(1, -(-outputs // 32))), u32, u8, *(_message_struct(m, received=False) for m in bus.send)]
+    )
+    return struct_size(
+        [
+            instance,
+            bus_state,
+            trace_state,
+            image_in,
+            image_out,
+            array(rx_state, max(1, len(bus.receive))),
+            array(u16, max(1, table.words)),
+            array(u8, nodes),
+            array(u8, nodes),
+            array(u8, max(1, len(bus.send))),
+        ]
+    )[0]
+
+
+def flash_bytes(table: Table, bus: Bus) -> int:
+    """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
+    pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
+    ports = sum(
+        struct_size(scalar(port.c_type) for port in use.leaf.ports)[0] * len(use.nodes)
+        for use in table.leaves
+        if use.leaf.ports
+    )
+    rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
+    tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)
+    return 12 * len(table.rows) + 12 * len(table.leaves) + 4 * len(table.parameters) + ports + rx + tx
+
+
+def frame_bits(length: int, *, extended: bool, fd: bool) -> int:
+    """Bits of a frame on the wire with the most stuff bits, interframe space included.
+
+    Classic: 47 (extended 67) + 8 a byte, and one stuff bit for four of the 34 (54) + 8 a byte that are stuffed
+    (Davis et al., "Controller Area Network (CAN) schedulability analysis", 2007). FD frames are counted at the nominal
+    bit rate: an upper bound.
+    """
+    fixed, stuffed = (67, 54) if extended else (47, 34)
+    return fixed + (8 if fd else 0) + 8 * length + (stuffed + 8 * length - 1) // 4
+
+
+def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> float:
+    """Share of the bit rate that all cyclic messages of the DBC take, with a full trace in every tick."""
+    per_second = sum(
+        frame_bits(length, extended=extended, fd=fd) * 1000 / cycle for length, extended, fd, cycle in bus.load if cycle
+    )
+    for name, frames in (("CanopyTick", 1), ("CanopyChange", changes_max), ("CanopySnapshot", 1)):
+        if name in bus.trace and bus.trace[name].cycle_ms == 0:
+            message = bus.trace[name]
+            per_second += frames * frame_bits(8, extended=message.extended, fd=False) * 1000 / period_ms
+    return round(100 * per_second / bitrate, 2)
+
+
+def make_budget(table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> Budget:
+    """The whole budget. A tick visits each node at most once, so it calls each leaf at most once (SEMANTICS, rule 3)."""
+    return Budget(
+        ram_bytes=ram_bytes(table, bus),
+        flash_bytes=flash_bytes(table, bus),
+        nodes=len(table.rows),
+        worst_tick_leaf_calls=sum(len(use.nodes) for use in table.leaves),
+        max_depth=max(row.depth for row in table.rows),
+        can_load_percent=can_load_percent(bus, period_ms, changes_max, bitrate),
+        bitrate=bitrate,
+    )

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""`canopy compile`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from canopy.compiler.budget import Budget
+from canopy.compiler.emit import load_application, render, write_files
+from canopy.compiler.errors import CompileError
+
+INPUT_ERROR = 2
+
+
+def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int | None) -> None:
+    def limit(value: int | None) -> str:
+        return f" of {value}" if value is not None else ""
+
+    click.echo(f"{name}: {budget.nodes} nodes, depth {budget.max_depth}")
+    click.echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
+    click.echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
+    click.echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
+    click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
+
+
+@click.command()
+@click.argument("tree", type=click.Path(path_type=Path))
+@click.option("--dbc", required=True, type=click.Path(path_type=Path), help="The bus the controller is on.")
+@click.option("--node", required=True, help="The controller's name among the DBC's nodes (BU_).")
+@click.option("--period-ms", required=True, type=click.IntRange(1, 3_600_000), help="Time from tick to tick.")
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder for the generated files.")
+@click.option("--name", help="Name of the application; the tree file's stem if not given.")
+@click.option("--include", help="Header of yours with the state types of leaves, included by the generated files.")
+@click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
+@click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
+@click.option("--max-flash", type=int, help="Fail when the constant tables are larger than so many bytes.")
+@click.option("--json", "as_json", is_flag=True, help="Print the budget as JSON.")
+def command(
+    tree: Path,
+    dbc: Path,
+    node: str,
+    period_ms: int,
+    output: Path,
+    name: str | None,
+    include: str | None,
+    bitrate: int,
+    max_ram: int | None,
+    max_flash: int | None,
+    as_json: bool,
+) -> None:
+    """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
+
+    Writes NAME.c, NAME.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the host tools.
+    Nothing is written when anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
+
+    \b
+    Example:
+      canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
+    """
+    try:
+        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include)
+        files = render(application)
+    except CompileError as error:
+        click.echo(str(error), err=True)
+        sys.exit(INPUT_ERROR)
+    budget = application.budget
+    for what, used, most in (("RAM", budget.ram_bytes, max_ram), ("flash", budget.flash_bytes, max_flash)):
+        if most is not None and used > most:
+            click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
+            sys.exit(INPUT_ERROR)
+    try:
+        write_files(output, files)
+    except OSError as error:
+        click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
+        sys.exit(INPUT_ERROR)
+    if as_json:
+        click.echo(json.dumps(budget.as_dict()))
+    else:
+        _print_budget(application.name, budget, max_ram, max_flash)

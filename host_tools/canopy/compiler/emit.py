@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""The compiled application as files: C through the templates, and the model file for the host tools."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+
+from canopy import __version__
+from canopy.compiler import codec
+from canopy.compiler.budget import Budget, make_budget
+from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
+from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.names import is_c_identifier, snake
+from canopy.compiler.table import Table, make_table
+from canopy.compiler.tree_reader import read_tree
+
+MODEL_FORMAT = 1
+
+# Most CanopyChange frames in one tick: two changes each. What does not fit comes in the next tick.
+CHANGES_MAX = 8
+
+
+@dataclass(frozen=True)
+class Application:
+    """Everything that the templates need."""
+
+    name: str
+    table: Table
+    bus: Bus
+    period_ms: int
+    budget: Budget
+    changes_max: int
+    include: str | None
+
+    @property
+    def health_every(self) -> int:
+        """CanopyHealth is sent in every so-many-th tick."""
+        health = self.bus.trace.get("CanopyHealth")
+        return max(1, health.cycle_ms // self.period_ms) if health is not None else 1
+
+
+def _check_leaves(table: Table, bus: Bus) -> None:
+    messages = {
+        "reads": [message.name for message in bus.receive],
+        "writes": [message.name for message in bus.send],
+    }
+    for use in table.leaves:
+        for verb, known in messages.items():
+            for name in getattr(use.leaf, verb):
+                message, _, signal = name.partition(".")
+                if message not in known:
+                    raise CompileError(
+                        use.leaf.place,
+                        f"leaf '{use.leaf.id}' {verb} '{name}', which node '{bus.node}' of {bus.path.name} does not "
+                        f"{'receive' if verb == 'reads' else 'send'}",
+                        nearest(message, known),
+                    )
+                owner = next(m for m in bus.receive + bus.send if m.name == message)
+                signals = [s.name for s in owner.signals]
+                if signal and signal not in signals:
+                    raise CompileError(
+                        use.leaf.place, f"message '{message}' has no signal '{signal}'", nearest(signal, signals)
+                    )
+
+
+def load_application(
+    name: str, tree: Path, dbc: Path, node: str, period_ms: int, bitrate: int, include: str | None = None
+) -> Application:
+    """Reads and checks everything.
+
+    Raises:
+        CompileError: something in the tree, in the DBC, or between them cannot be compiled.
+    """
+    if not is_c_identifier(name) or name != snake(name):
+        raise CompileError(Place("--name"), f"'{name}' is not a lower-case C identifier", f"for example {snake(name)}")
+    table = make_table(read_tree(tree))
+    bus = read_bus(dbc, node, period_ms)
+    _check_leaves(table, bus)
+    changes_max = min(CHANGES_MAX, -(-len(table.rows) // 2))
+    budget = make_budget(table, bus, period_ms, changes_max, bitrate)
+    return Application(name, table, bus, period_ms, budget, changes_max, include)
+
+
+def _category(row_category: str, kind: str) -> str:
+    if row_category == "LEAF":
+        return "condition" if kind == "Condition" else "action"
+    return row_category.lower()
+
+
+def model(application: Application) -> dict[str, object]:
+    """The model file's content (docs/model.md)."""
+    table, bus = application.table, application.bus
+    return {
+        "format": MODEL_FORMAT,
+        "canopy": __version__,
+        "application": application.name,
+        "hash": table.hash,
+        "period_us": application.period_ms * 1000,
+        "tree": {
+            "id": table.tree.id,
+            "file": table.tree.path.name,
+            "nodes": [
+                {
+                    "index": index,
+                    "parent": row.parent if index else None,
+                    "end": row.end,
+                    "type": row.node.leaf.id if row.node.leaf else row.node.type.name,
+                    "category": _category(row.node.type.category, row.node.type.name),
+                    "name": row.node.name,
+                    "line": row.node.place.line,
+                }
+                for index, row in enumerate(table.rows)
+            ],
+        },
+        "bus": {
+            "dbc": bus.path.name,
+            "node": bus.node,
+            "receive": [message.name for message in bus.receive],
+            "send": [message.name for message in bus.send],
+        },
+        "trace": {name: message.id for name, message in bus.trace.items()},
+        "budget": application.budget.as_dict(),
+    }
+
+
+def _stale_test(leaf: Leaf) -> str:
+    messages = sorted({name.partition(".")[0] for name in leaf.reads})
+    return " || ".join(f"!app->input.{snake(message)}.fresh" for message in messages)
+
+
+def _parameters(leaf: Leaf, bus: Bus) -> str:
+    parts = [f"const {bus.name}_input_t *in"]
+    if leaf.writes:
+        parts.append(f"{bus.name}_output_t *out")
+    if leaf.ports:
+        parts.append(f"const {leaf.c_name}_ports_t *ports")
+    if leaf.state:
+        parts.append(f"{leaf.state} *self")
+    return ", ".join(parts)
+
+
+def _arguments(leaf: Leaf) -> str:
+    parts = ["&app->input"]
+    if leaf.writes:
+        parts.append("&app->output")
+    if leaf.ports:
+        parts.append(f"&{leaf.c_name}_ports[parameter]")
+    if leaf.state:
+        parts.append(f"&app->{leaf.c_name}[parameter]")
+    return ", ".join(parts)
+
+
+def _comment(text: str) -> str:
+    """Text that may stand inside a C comment."""
+    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+
+
+def render(application: Application) -> dict[str, str]:
+    """File name -> content. The same input gives the same bytes."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("canopy.compiler"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"snake": snake, "comment": _comment}
+    environment.globals |= {
+        "codec": codec,
+        "stale_test": _stale_test,
+        "parameters_of": _parameters,
+        "arguments_of": _arguments,
+        "TRACE": list(TRACE_LAYOUT),
+    }
+    context = {"app": application, "table": application.table, "bus": application.bus, "version": __version__}
+    bus, name = application.bus.name, application.name
+    templates = {
+        f"{bus}_bus.h": "bus.h.j2",
+        f"{bus}_bus.c": "bus.c.j2",
+        f"{name}_leaves.h": "leaves.h.j2",
+        f"{name}.h": "application.h.j2",
+        f"{name}.c": "application.c.j2",
+    }
+    files = {file: environment.get_template(template).render(context) for file, template in templates.items()}
+    files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
+    files[application.bus.path.name] = application.bus.path.read_text(encoding="cp1252")
+    return files
+
+
+def write_files(folder: Path, files: dict[str, str]) -> None:
+    """Writes all files, each one whole or not at all.
+
+    Raises:
+        OSError: the folder cannot be made or written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        encoding = "cp1252" if name.endswith(".dbc") else "utf-8"
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
+        try:
+            with os.fdopen(handle, "w", encoding=encoding, newline="\n") as file:
+                file.write(content)
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, folder / name)
+        except BaseException:
+            os.unlink(temporary)
+            raise

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""XML text into elements that know their line and column.
+
+The standard library's expat does the parsing: it tells the position of each tag, which ElementTree and lxml do not. A
+document type declaration is refused, and with it every entity trick.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from canopy.compiler.errors import CompileError, Place
+
+MAX_BYTES = 16 * 1024 * 1024
+MAX_DEPTH = 65_534
+
+
+@dataclass
+class Element:
+    """An XML element: tag, attributes, child elements, text directly inside, and where its tag begins."""
+
+    tag: str
+    attributes: dict[str, str]
+    place: Place
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+
+class _Builder:
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._parser = expat.ParserCreate()
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._text
+        self._parser.StartDoctypeDeclHandler = self._doctype
+        self._open: list[Element] = []
+        self._root: Element | None = None
+
+    def _here(self) -> Place:
+        return Place(self._file, self._parser.CurrentLineNumber, self._parser.CurrentColumnNumber + 1)
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, self._here())
+        if self._open:
+            self._open[-1].children.append(element)
+        else:
+            self._root = element
+        if len(self._open) >= MAX_DEPTH:
+            raise CompileError(element.place, f"elements are nested more than {MAX_DEPTH} deep")
+        self._open.append(element)
+
+    def _end(self, _tag: str) -> None:
+        self._open.pop()
+
+    def _text(self, data: str) -> None:
+        if self._open:
+            self._open[-1].text += data
+
+    def _doctype(self, *_: object) -> None:
+        raise CompileError(
+            self._here(), "a document type declaration (<!DOCTYPE …>) is not accepted", "remove it: trees need none"
+        )
+
+    def parse(self, data: bytes) -> Element:
+        try:
+            self._parser.Parse(data, True)
+        except expat.ExpatError as error:
+            place = Place(self._file, error.lineno, error.offset + 1)
+            raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+        assert self._root is not None  # expat refuses a document without an element
+        return self._root
+
+
+def read_xml(path: Path) -> Element:
+    """The root element of the file.
+
+    Raises:
+        CompileError: the file cannot be read, is larger than 16 MiB, or is not well-formed XML without a DOCTYPE.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise CompileError(Place(str(path)), f"the file has {size} bytes; at most {MAX_BYTES} are read")
+        data = path.read_bytes()
+    except OSError as error:
+        raise CompileError(Place(str(path)), f"cannot be read: {error.strerror}") from error
+    return _Builder(str(path)).parse(data)

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * Time: 64-bit microseconds, monotonic, from any start. The engine never reads a clock; the loop does, through this.
+ */
+#ifndef CANOPY_CLOCK_H
+#define CANOPY_CLOCK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/** A point in time or a duration [µs]. */
+typedef uint64_t canopy_time_t;
+
+/** A clock driver: functions and the object they work on. */
+typedef struct {
+    /** The driver's object; handed to every function. */
+    void *context;
+    /** Now [µs]. Never goes back. */
+    canopy_time_t (*now)(void *context);
+    /**
+     * Returns when now() has reached deadline (at once when it is past), or earlier when the program shall stop.
+     * @return true when the deadline was reached, false when the loop shall end (a signal, end of a simulation).
+     */
+    bool (*wait_until)(void *context, canopy_time_t deadline);
+} canopy_clock_t;
+
+/** True when the time `now` is at or after `deadline`; right across the wrap-around of the 64-bit count. */
+static inline bool canopy_time_reached(canopy_time_t now, canopy_time_t deadline)
+{
+    return (now - deadline) < (UINT64_C(1) << 63);
+}
+
+#endif

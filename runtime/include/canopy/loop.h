@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * The fixed-period loop, one scan cycle as in a PLC: drain what has arrived into the input image, tick, commit the
+ * output image, trace, account for time.
+ *
+ *     static const canopy_loop_config_t config = {.app = &nao_home_app, .can = &can, .clock = &clock};
+ *     canopy_loop_t loop;
+ *     if (canopy_loop_init(&loop, &config) == CANOPY_OK) canopy_loop_run(&loop);
+ *
+ * Threads: everything here runs in one thread. A driver may fill its queue from an interrupt meanwhile.
+ */
+#ifndef CANOPY_LOOP_H
+#define CANOPY_LOOP_H
+
+#include "canopy/bus.h"
+#include "canopy/can.h"
+#include "canopy/clock.h"
+#include "canopy/trace.h"
+#include "canopy/tree.h"
+
+/** One application: constant tables, and where its static memory lies. Made by `canopy compile`. */
+typedef struct {
+    const char *name;
+    canopy_time_t period; /**< [us], > 0. */
+    const canopy_tree_t *tree;
+    const canopy_bus_t *bus;
+    const canopy_trace_config_t *trace;
+    void *memory; /**< The application's one static object; handed to the leaves' functions. The rest lies in it: */
+    canopy_tree_instance_t *tree_instance;
+    uint8_t *status;              /**< tree->node_count. */
+    uint16_t *words;              /**< tree->word_count. */
+    canopy_bus_state_t *bus_state;
+    void *input;                  /**< The input image. */
+    void *output;                 /**< The output image. */
+    canopy_rx_state_t *rx;        /**< bus->rx_count. */
+    uint8_t *tx_counters;         /**< bus->tx_count. */
+    canopy_trace_state_t *trace_state;
+    uint8_t *sent;                /**< tree->node_count. */
+} canopy_app_t;
+
+/** Numbers of the fault hook; stable. */
+typedef enum {
+    CANOPY_FAULT_LEAF_STATUS = 1, /**< A leaf returned no valid status; detail: its node. */
+    CANOPY_FAULT_OVERRUN = 2,     /**< A cycle took longer than the period; detail: its length [us]. */
+    CANOPY_FAULT_CAN_RECEIVE = 3  /**< The driver's receive failed; detail: minus the canopy_error_t. */
+} canopy_fault_t;
+
+/** What the loop works with. Constant. */
+typedef struct {
+    void *context; /**< Handed to the functions below. */
+    const canopy_app_t *app;
+    const canopy_can_t *can;
+    const canopy_clock_t *clock;
+    /** Most frames taken in one cycle, so that a flooded bus cannot hold up the tick; 0: 64. The rest waits. */
+    uint16_t rx_max;
+    /** Called after a cycle that was in time; a late one does not kick. NULL: no watchdog. */
+    void (*kick_watchdog)(void *context);
+    /** Called for each fault, from the loop's thread. NULL: counters only. */
+    void (*on_fault)(void *context, canopy_fault_t fault, uint32_t detail);
+    /** Called after each cycle; false ends canopy_loop_run(). NULL: runs until the clock's wait_until() is false. */
+    bool (*after_cycle)(void *context, canopy_status_t root);
+} canopy_loop_config_t;
+
+#define CANOPY_LATENESS_BUCKETS 12u
+
+/** State and accounts of a loop. Counters saturate. */
+typedef struct {
+    const canopy_loop_config_t *config;
+    canopy_time_t deadline;      /**< When the next cycle is to start [us]. */
+    uint32_t ticks;              /**< Cycles done. */
+    uint32_t overruns;           /**< Cycles that were not done before the next was due. */
+    uint32_t slips;              /**< Cycles left out after overruns; the phase is kept. */
+    uint32_t rx_backlogs;        /**< Cycles that left frames waiting because of rx_max. */
+    uint32_t rx_errors;          /**< Failures of the driver's receive. */
+    canopy_time_t longest_cycle; /**< [us] */
+    canopy_time_t most_late;     /**< Latest start of a cycle after its deadline [us]. */
+    /** Starts of cycles by lateness: bucket i counts those below 16 us << i and not below the one before; the last
+     * one takes the rest. */
+    uint32_t lateness[CANOPY_LATENESS_BUCKETS];
+} canopy_loop_t;
+
+/**
+ * Sets up a loop and its application: tree IDLE, all counters 0, first deadline now.
+ * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT when something needed is NULL or the period is 0. O(nodes + messages).
+ */
+canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t *config);
+
+/**
+ * One scan cycle, without waiting and without accounting for time: for programs that keep their own time.
+ * @param now this cycle's time [us]
+ * @return status of the root
+ */
+canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now);
+
+/**
+ * Cycles at the period until the clock or after_cycle says stop, then halts the tree and commits its last outputs once.
+ * Deadlines are absolute: lateness does not add up. After an overrun the cycles that are past are left out.
+ */
+void canopy_loop_run(canopy_loop_t *self);
+
+/**
+ * Halts the tree and sends the outputs that result: safe values, unless a halt handler wrote others.
+ * canopy_loop_run() does it at its end.
+ */
+void canopy_loop_stop(canopy_loop_t *self, canopy_time_t now);
+
+#endif

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * Helpers of the generated codecs and images: raw values, sign extension, and who may write an output.
+ */
+#ifndef CANOPY_SIGNAL_H
+#define CANOPY_SIGNAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/**
+ * Raw value of a physical constant, rounded to the nearest. For constant expressions only, which the compiler folds:
+ * then no floating point is left in the program (the build checks the runtime for that, not your leaves).
+ */
+#define CANOPY_RAW(type, physical, scale, offset)                                                                      \
+    ((type)(((((physical) - (offset)) / (scale)) < 0.0) ? (((physical) - (offset)) / (scale)) - 0.5                    \
+                                                        : (((physical) - (offset)) / (scale)) + 0.5))
+
+/** Value of a two's complement number in the low `bits` (1..31) of raw; the bits above must be 0. */
+static inline int32_t canopy_sign_extend32(uint32_t raw, unsigned bits)
+{
+    uint32_t sign = UINT32_C(1) << (bits - 1u);
+
+    return (int32_t)(raw ^ sign) - (int32_t)sign;
+}
+
+/** As canopy_sign_extend32(), for 1..63 bits. */
+static inline int64_t canopy_sign_extend64(uint64_t raw, unsigned bits)
+{
+    uint64_t sign = UINT64_C(1) << (bits - 1u);
+
+    return (int64_t)(raw ^ sign) - (int64_t)sign;
+}
+
+/**
+ * May this write to output number `signal` stand? Rule 5 of docs/semantics.md: what a ticked action writes wins over
+ * what a halt handler writes in the same tick, whichever came first.
+ *
+ * @param written one bit a signal: it has been written by a ticked action in this tick
+ * @param halting the write comes from a halt handler
+ */
+static inline bool canopy_output_claim(uint32_t *written, unsigned signal, bool halting)
+{
+    uint32_t bit = UINT32_C(1) << (signal % 32u);
+    uint32_t *word = &written[signal / 32u];
+
+    if (halting) {
+        return (*word & bit) == 0u;
+    }
+    *word |= bit;
+    return true;
+}
+
+#endif

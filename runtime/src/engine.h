@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * What the node types share, inside the runtime. A node type is three small functions in a file of src/nodes/:
+ *
+ *   enter  the parent (or the tick) has come to this node: what now?
+ *   child  the child that enter or child asked for has returned `status`: what now?
+ *   halt   this RUNNING node is abandoned; its descendants have been halted: forget what must be forgotten.
+ *
+ * enter and child answer with a canopy_step_t: tick that child next, or this node is done for this tick with that
+ * status. The engine stores the status. So the tick is a loop, and its stack does not grow with the tree.
+ */
+#ifndef CANOPY_ENGINE_H
+#define CANOPY_ENGINE_H
+
+#include "canopy/tree.h"
+
+/** Below STEP_DONE: the child to tick. Else STEP_DONE + status. */
+typedef uint32_t canopy_step_t;
+
+#define CANOPY_STEP_DONE 0x10000u
+
+static inline canopy_step_t canopy_done(canopy_status_t status)
+{
+    return CANOPY_STEP_DONE + (canopy_step_t)status;
+}
+
+/** Was the node RUNNING when this tick came to it? (A node's status is stored when it returns.) */
+static inline bool canopy_resumes(const canopy_tree_instance_t *self, uint16_t node)
+{
+    return self->status[node] == (uint8_t)CANOPY_RUNNING;
+}
+
+/** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. */
+void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t node);
+
+/** The parent resets a child: halted if RUNNING, then IDLE. */
+static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t child)
+{
+    if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
+        canopy_halt_subtree(self, child);
+    }
+    self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
+}
+
+/** Resets the children from `first` to the last one of `node`. @return true when every one of them was SKIPPED. */
+static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t node, uint16_t first)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t end = nodes[node].end;
+    bool all_skipped = true;
+
+    for (uint16_t child = first; child != end; child = nodes[child].end) {
+        all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
+        canopy_reset_child(self, child);
+    }
+    return all_skipped;
+}
+
+/** The node's parameter, as written in the XML. */
+static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node)
+{
+    return self->tree->parameters[self->tree->nodes[node].parameter];
+}
+
+/** The node's state words. */
+static inline uint16_t *canopy_words(canopy_tree_instance_t *self, uint16_t node)
+{
+    return &self->words[self->tree->nodes[node].state];
+}
+
+#endif

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+/** @file The trace of a tick as CAN frames. Layout: docs/trace.md, and the Canopy... messages of the DBC. */
+#include "canopy/trace.h"
+
+#include <stddef.h>
+
+enum { SNAPSHOT_NODES = 10, NO_NODE = 0xFFFF, NO_STATUS = 15 };
+
+static void put16(uint8_t *data, uint32_t value)
+{
+    data[0] = (uint8_t)(value & 0xFFu);
+    data[1] = (uint8_t)((value >> 8) & 0xFFu);
+}
+
+static uint32_t at_most16(uint32_t value)
+{
+    return value < UINT16_MAX ? value : UINT16_MAX;
+}
+
+static void send(canopy_trace_state_t *self, const canopy_can_t *can, canopy_trace_id_t id, const uint8_t data[8])
+{
+    canopy_can_frame_t frame = {.id = id.id, .flags = id.flags, .length = 8};
+
+    for (unsigned byte = 0; byte < 8u; byte++) {
+        frame.data[byte] = data[byte];
+    }
+    if (can->send(can->context, &frame) != 1) {
+        canopy_count(&self->tx_dropped);
+    }
+}
+
+/** How many nodes' statuses differ from what was sent, counted up to `most`. */
+static uint32_t count_changes(const canopy_trace_state_t *self, const canopy_tree_instance_t *tree, uint32_t most)
+{
+    uint32_t changes = 0;
+
+    for (uint16_t node = 0; node < tree->tree->node_count && changes < most; node++) {
+        changes += self->sent[node] != tree->status[node] ? 1u : 0u;
+    }
+    return changes;
+}
+
+static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_can_t *can,
+                      const canopy_trace_tick_t *tick, uint32_t changes)
+{
+    uint8_t data[8] = {self->sequence};
+
+    put16(&data[1], tick->tick);
+    put16(&data[3], tick->tick >> 16);
+    data[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
+    data[6] = (uint8_t)changes;
+    data[7] = (uint8_t)(tick->overruns & 0xFFu);
+    self->sequence++;
+    send(self, can, config->tick, data);
+}
+
+/** The next node from `node` on whose status has changed, or node_count; what is found counts as sent. */
+static uint16_t take_change(canopy_trace_state_t *self, const canopy_tree_instance_t *tree, uint16_t node)
+{
+    while (node < tree->tree->node_count && self->sent[node] == tree->status[node]) {
+        node++;
+    }
+    if (node < tree->tree->node_count) {
+        self->sent[node] = tree->status[node];
+    }
+    return node;
+}
+
+static void send_changes(const canopy_trace_config_t *config, canopy_trace_state_t *self,
+                         const canopy_tree_instance_t *tree, const canopy_can_t *can, uint32_t changes)
+{
+    uint16_t node = 0;
+
+    while (changes > 0u) {
+        uint16_t a = take_change(self, tree, node);
+        uint16_t b = changes > 1u ? take_change(self, tree, (uint16_t)(a + 1u)) : (uint16_t)NO_NODE;
+        uint8_t data[8] = {self->sequence};
+        unsigned status_b = b != NO_NODE ? tree->status[b] : (unsigned)NO_STATUS;
+
+        put16(&data[1], a);
+        put16(&data[3], b);
+        data[5] = (uint8_t)(tree->status[a] | (status_b << 4));
+        data[6] = config->tree;
+        self->sequence++;
+        send(self, can, config->change, data);
+        changes -= changes > 1u ? 2u : 1u;
+        node = (uint16_t)(b + 1u);
+    }
+}
+
+static void send_snapshot(const canopy_trace_config_t *config, canopy_trace_state_t *self,
+                          const canopy_tree_instance_t *tree, const canopy_can_t *can)
+{
+    uint8_t data[8] = {self->sequence};
+    uint16_t count = tree->tree->node_count;
+
+    put16(&data[1], self->next_node);
+    for (unsigned place = 0; place < SNAPSHOT_NODES; place++) {
+        uint32_t node = self->next_node + place;
+        unsigned code = node < count ? tree->status[node] : (unsigned)NO_STATUS;
+
+        data[3u + (place / 2u)] |= (uint8_t)(code << (4u * (place % 2u)));
+    }
+    self->next_node = self->next_node + (uint32_t)SNAPSHOT_NODES < count
+                          ? (uint16_t)(self->next_node + (uint16_t)SNAPSHOT_NODES)
+                          : 0u;
+    self->sequence++;
+    send(self, can, config->snapshot, data);
+}
+
+static void send_health(const canopy_trace_config_t *config, canopy_trace_state_t *self,
+                        const canopy_tree_instance_t *tree, const canopy_can_t *can,
+                        const canopy_bus_counters_t *counters)
+{
+    uint8_t data[8];
+
+    put16(&data[0], at_most16(canopy_bus_rejected(counters)));
+    put16(&data[2], at_most16(counters->unknown_id));
+    put16(&data[4], at_most16(counters->tx_dropped + self->tx_dropped));
+    put16(&data[6], at_most16(tree->faults));
+    send(self, can, config->health, data);
+}
+
+void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,
+                       const canopy_tree_instance_t *tree, const canopy_can_t *can, const canopy_trace_tick_t *tick,
+                       const canopy_bus_counters_t *counters)
+{
+    bool traces_nodes = config->change.id != CANOPY_TRACE_OFF;
+    uint32_t changes = traces_nodes ? count_changes(self, tree, 2u * config->changes_max) : 0u;
+
+    if (config->tick.id != CANOPY_TRACE_OFF) {
+        send_tick(config, self, can, tick, changes);
+    }
+    send_changes(config, self, tree, can, changes);
+    if (config->snapshot.id != CANOPY_TRACE_OFF) {
+        send_snapshot(config, self, tree, can);
+    }
+    if (config->health.id != CANOPY_TRACE_OFF && tick->tick % config->health_every == 0u) {
+        send_health(config, self, tree, can, counters);
+    }
+}

@@ -1,0 +1,185 @@
+/* SPDX-License-Identifier: MIT */
+/** @file The tick: a loop that goes down to a leaf and comes up again, and the halt. No recursion, no allocation. */
+#include "canopy/tree.h"
+
+#include <stddef.h>
+
+#include "engine.h"
+#include "nodes/inverter.h"
+#include "nodes/leaf.h"
+#include "nodes/reactive.h"
+#include "nodes/reactive_parallel.h"
+#include "nodes/retry_until_successful.h"
+#include "nodes/sequence.h"
+#include "nodes/timeout.h"
+
+canopy_error_t canopy_tree_init(canopy_tree_instance_t *self, const canopy_tree_t *tree, uint8_t *status,
+                                uint16_t *words, void *application)
+{
+    if (self == NULL || tree == NULL || tree->nodes == NULL || status == NULL ||
+        (words == NULL && tree->word_count != 0u) || tree->node_count == 0u || tree->node_count > CANOPY_NODES_MAX) {
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    *self = (canopy_tree_instance_t){
+        .tree = tree, .application = application, .status = status, .words = words, .fault_node = UINT16_MAX};
+    for (uint16_t node = 0; node < tree->node_count; node++) {
+        status[node] = (uint8_t)CANOPY_IDLE;
+    }
+    for (uint16_t word = 0; word < tree->word_count; word++) {
+        words[word] = 0;
+    }
+    return CANOPY_OK;
+}
+
+canopy_status_t canopy_leaf_fault(canopy_tree_instance_t *self, uint16_t node)
+{
+    if (self->faults != UINT32_MAX) {
+        self->faults++;
+    }
+    self->fault_node = node;
+    return CANOPY_FAILURE;
+}
+
+/** The tick has come down to this node. */
+static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
+{
+    switch ((canopy_node_type_t)self->tree->nodes[node].type) {
+    case CANOPY_NODE_CONDITION:
+    case CANOPY_NODE_SYNC_ACTION:
+        return canopy_leaf_enter(self, node);
+    case CANOPY_NODE_STATEFUL_ACTION:
+        return canopy_stateful_action_enter(self, node);
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+        return canopy_sequence_enter(self, node);
+    case CANOPY_NODE_REACTIVE_SEQUENCE:
+    case CANOPY_NODE_REACTIVE_FALLBACK:
+        return canopy_reactive_enter(node);
+    case CANOPY_NODE_REACTIVE_PARALLEL:
+        return canopy_reactive_parallel_enter(node);
+    case CANOPY_NODE_INVERTER:
+        return canopy_inverter_enter(node);
+    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
+        return canopy_retry_enter(self, node);
+    case CANOPY_NODE_TIMEOUT:
+        return canopy_timeout_enter(self, node);
+    case CANOPY_NODE_TYPES:
+        break;
+    }
+    return canopy_done(canopy_leaf_fault(self, node));
+}
+
+/** A child of this node has returned. */
+static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                       canopy_status_t status)
+{
+    switch ((canopy_node_type_t)self->tree->nodes[node].type) {
+    case CANOPY_NODE_SEQUENCE:
+        return canopy_sequence_child(self, node, child, status, CANOPY_SUCCESS);
+    case CANOPY_NODE_FALLBACK:
+        return canopy_sequence_child(self, node, child, status, CANOPY_FAILURE);
+    case CANOPY_NODE_REACTIVE_SEQUENCE:
+        return canopy_reactive_child(self, node, child, status, CANOPY_SUCCESS);
+    case CANOPY_NODE_REACTIVE_FALLBACK:
+        return canopy_reactive_child(self, node, child, status, CANOPY_FAILURE);
+    case CANOPY_NODE_REACTIVE_PARALLEL:
+        return canopy_reactive_parallel_child(self, node, child);
+    case CANOPY_NODE_INVERTER:
+        return canopy_inverter_child(self, child, status);
+    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
+        return canopy_retry_child(self, node, child, status);
+    case CANOPY_NODE_TIMEOUT:
+        return canopy_timeout_child(self, child, status);
+    case CANOPY_NODE_CONDITION:
+    case CANOPY_NODE_SYNC_ACTION:
+    case CANOPY_NODE_STATEFUL_ACTION:
+    case CANOPY_NODE_TYPES:
+        break;
+    }
+    return canopy_done(canopy_leaf_fault(self, node));
+}
+
+/** This RUNNING node is abandoned; what is below it has been halted. */
+static void halt_node(canopy_tree_instance_t *self, uint16_t node)
+{
+    switch ((canopy_node_type_t)self->tree->nodes[node].type) {
+    case CANOPY_NODE_STATEFUL_ACTION:
+        canopy_stateful_action_halt(self, node);
+        break;
+    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
+        canopy_retry_halt(self, node);
+        break;
+    case CANOPY_NODE_CONDITION:
+    case CANOPY_NODE_SYNC_ACTION:
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_REACTIVE_SEQUENCE:
+    case CANOPY_NODE_REACTIVE_FALLBACK:
+    case CANOPY_NODE_REACTIVE_PARALLEL:
+    case CANOPY_NODE_INVERTER:
+    case CANOPY_NODE_TIMEOUT:
+    case CANOPY_NODE_TYPES:
+        break;
+    }
+    self->status[node] |= (uint8_t)CANOPY_STATUS_WAS;
+}
+
+canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t node = 0;
+
+    self->now = now;
+    for (;;) {
+        canopy_step_t step = enter(self, node);
+
+        while (step >= CANOPY_STEP_DONE) {
+            canopy_status_t status = (canopy_status_t)(step - CANOPY_STEP_DONE);
+            uint16_t child = node;
+
+            self->status[child] = (uint8_t)status;
+            if (child == 0u) {
+                return status;
+            }
+            node = nodes[child].parent;
+            step = child_done(self, node, child, status);
+        }
+        node = (uint16_t)step;
+    }
+}
+
+/*
+ * Depth-first order makes a subtree a range of the table, so the halt walks it from left to right and closes each inner
+ * node after its last descendant: deepest first, siblings in order. What is not RUNNING has nothing RUNNING below it.
+ */
+void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t end = nodes[top].end;
+    uint16_t node = top;
+
+    while (node < end) {
+        bool running = self->status[node] == (uint8_t)CANOPY_RUNNING;
+        uint16_t next = nodes[node].end;
+
+        if (running && next != node + 1u) {
+            node++;
+            continue;
+        }
+        if (running) {
+            halt_node(self, node);
+        } else {
+            self->status[node] |= (uint8_t)CANOPY_STATUS_WAS;
+        }
+        while (node != top && nodes[nodes[node].parent].end == next) {
+            node = nodes[node].parent;
+            halt_node(self, node);
+        }
+        node = next;
+    }
+}
+
+void canopy_tree_halt(canopy_tree_instance_t *self)
+{
+    canopy_reset_child(self, 0);
+}

@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+/** @file Control nodes against docs/semantics.md: which children are ticked and halted, in order, and what comes out. */
+#include "scripted_leaves.h"
+
+static bench_t bench;
+static const int32_t none[] = {0};
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static void start_three_actions(canopy_node_type_t type)
+{
+    static canopy_node_t nodes[] = {INNER(SEQUENCE, 0, 4, 0, 0), ACTION(0, 1, 0), ACTION(0, 2, 1), ACTION(0, 3, 2)};
+
+    nodes[0].type = (uint8_t)type;
+    START(nodes, none);
+}
+
+static void sequence_resumes_at_the_running_child(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE);
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("FRS", CANOPY_RUNNING, "b'");
+    EXPECT("FSR", CANOPY_RUNNING, "b'c");
+    EXPECT("FFS", CANOPY_SUCCESS, "c'");
+    EXPECT("SSS", CANOPY_SUCCESS, "abc");
+    EXPECT("SFS", CANOPY_FAILURE, "ab");
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("SFS", CANOPY_FAILURE, "b'");
+    EXPECT("FSS", CANOPY_FAILURE, "a");
+}
+
+static void fallback_is_its_mirror_image(void)
+{
+    start_three_actions(CANOPY_NODE_FALLBACK);
+    EXPECT("FRS", CANOPY_RUNNING, "ab");
+    EXPECT("SRS", CANOPY_RUNNING, "b'");
+    EXPECT("SFR", CANOPY_RUNNING, "b'c");
+    EXPECT("SSF", CANOPY_FAILURE, "c'");
+    EXPECT("FSS", CANOPY_SUCCESS, "ab");
+    EXPECT("FFF", CANOPY_FAILURE, "abc");
+}
+
+static void skipped_children_are_as_if_not_there(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE);
+    EXPECT("KSS", CANOPY_SUCCESS, "abc");
+    EXPECT("SSK", CANOPY_SUCCESS, "abc");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    start_three_actions(CANOPY_NODE_FALLBACK);
+    EXPECT("KFK", CANOPY_FAILURE, "abc");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    start_three_actions(CANOPY_NODE_REACTIVE_SEQUENCE);
+    EXPECT("KRS", CANOPY_RUNNING, "ab");
+    EXPECT("KSK", CANOPY_SUCCESS, "ab'c");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    start_three_actions(CANOPY_NODE_REACTIVE_FALLBACK);
+    EXPECT("KKF", CANOPY_FAILURE, "abc");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+}
+
+static void reactive_sequence_starts_at_the_first_child(void)
+{
+    start_three_actions(CANOPY_NODE_REACTIVE_SEQUENCE);
+    EXPECT("SSR", CANOPY_RUNNING, "abc");
+    EXPECT("SSR", CANOPY_RUNNING, "abc'");
+    EXPECT("SRR", CANOPY_RUNNING, "abc!");
+    EXPECT("SSR", CANOPY_RUNNING, "ab'c");
+    EXPECT("FSR", CANOPY_FAILURE, "ac!");
+    EXPECT("SSS", CANOPY_SUCCESS, "abc");
+}
+
+static void reactive_fallback_starts_at_the_first_child(void)
+{
+    start_three_actions(CANOPY_NODE_REACTIVE_FALLBACK);
+    EXPECT("FFR", CANOPY_RUNNING, "abc");
+    EXPECT("FRR", CANOPY_RUNNING, "abc!");
+    EXPECT("SRR", CANOPY_SUCCESS, "ab!");
+    EXPECT("FFF", CANOPY_FAILURE, "abc");
+}
+
+static void a_halted_child_is_started_anew(void)
+{
+    start_three_actions(CANOPY_NODE_REACTIVE_SEQUENCE);
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("FRS", CANOPY_FAILURE, "ab!");
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+}
+
+static void start_parallel(const int32_t *success_count)
+{
+    static const canopy_node_t nodes[] = {INNER(REACTIVE_PARALLEL, 0, 4, 0, 0), ACTION(0, 1, 0), ACTION(0, 2, 1),
+                                          ACTION(0, 3, 2)};
+
+    bench_start(&bench, nodes, 4, success_count, 1);
+}
+
+static void reactive_parallel_counts_all_children_every_tick(void)
+{
+    static const int32_t two = 2;
+
+    start_parallel(&two);
+    EXPECT("RRR", CANOPY_RUNNING, "abc");
+    EXPECT("SRR", CANOPY_RUNNING, "a'b'c'");
+    EXPECT("RSF", CANOPY_RUNNING, "ab'c'");
+    EXPECT("SSR", CANOPY_SUCCESS, "a'bcc!");
+    EXPECT("FFR", CANOPY_FAILURE, "abcc!");
+    EXPECT("FRR", CANOPY_RUNNING, "abc");
+    EXPECT("KSR", CANOPY_RUNNING, "ab'c'");
+    EXPECT("KSF", CANOPY_FAILURE, "abc'");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+}
+
+static void reactive_parallel_minus_one_means_all(void)
+{
+    static const int32_t all = -1;
+
+    start_parallel(&all);
+    EXPECT("SSR", CANOPY_RUNNING, "abc");
+    EXPECT("SSS", CANOPY_SUCCESS, "abc'");
+    EXPECT("SSF", CANOPY_FAILURE, "abc");
+    EXPECT("SSK", CANOPY_SUCCESS, "abc");
+}
+
+static void a_halt_goes_deepest_first_and_once(void)
+{
+    /* ReactiveFallback(a, Sequence(b, Parallel(c, Inverter(d), e))): a aborts everything below the sequence. */
+    static const int32_t two[] = {2};
+    static const canopy_node_t nodes[] = {
+        INNER(REACTIVE_FALLBACK, 0, 8, 0, 0), CONDITION(0, 1, 0), INNER(SEQUENCE, 0, 8, 0, 0), ACTION(2, 3, 1),
+        INNER(REACTIVE_PARALLEL, 2, 8, 0, 0), ACTION(4, 5, 2),    INNER(INVERTER, 4, 8, 0, 0), ACTION(6, 7, 3)};
+
+    START(nodes, two);
+    EXPECT("FSRR", CANOPY_RUNNING, "abcd");
+    EXPECT("FSSR", CANOPY_RUNNING, "ac'd'");
+    EXPECT("FSRR", CANOPY_RUNNING, "acd'");
+    EXPECT("SSRR", CANOPY_SUCCESS, "ac!d!");
+    EXPECT("SSRR", CANOPY_SUCCESS, "a");
+}
+
+static void halting_the_tree_follows_the_same_rule(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE);
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    bench.script.log[0] = '\0';
+    canopy_tree_halt(&bench.instance);
+    canopy_tree_halt(&bench.instance);
+    TEST_ASSERT_EQUAL_STRING("b!", bench.script.log);
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 0));
+    EXPECT("SSS", CANOPY_SUCCESS, "abc");
+}
+
+static void statuses_are_kept_for_monitors(void)
+{
+    start_three_actions(CANOPY_NODE_REACTIVE_FALLBACK);
+    EXPECT("FRS", CANOPY_RUNNING, "ab");
+    TEST_ASSERT_EQUAL(CANOPY_FAILURE, canopy_tree_status(&bench.instance, 1));
+    TEST_ASSERT_EQUAL(CANOPY_RUNNING, canopy_tree_status(&bench.instance, 2));
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 3));
+    EXPECT("SRS", CANOPY_SUCCESS, "ab!");
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 1));
+    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 1));
+    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_RUNNING, canopy_tree_status_code(&bench.instance, 2));
+}
+
+static void a_single_leaf_is_a_tree(void)
+{
+    static const canopy_node_t nodes[] = {ACTION(0, 0, 0)};
+
+    START(nodes, none);
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("R", CANOPY_RUNNING, "a'");
+    EXPECT("S", CANOPY_SUCCESS, "a'");
+    EXPECT("F", CANOPY_FAILURE, "a");
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(sequence_resumes_at_the_running_child);
+    RUN_TEST(fallback_is_its_mirror_image);
+    RUN_TEST(skipped_children_are_as_if_not_there);
+    RUN_TEST(reactive_sequence_starts_at_the_first_child);
+    RUN_TEST(reactive_fallback_starts_at_the_first_child);
+    RUN_TEST(a_halted_child_is_started_anew);
+    RUN_TEST(reactive_parallel_counts_all_children_every_tick);
+    RUN_TEST(reactive_parallel_minus_one_means_all);
+    RUN_TEST(a_halt_goes_deepest_first_and_once);
+    RUN_TEST(halting_the_tree_follows_the_same_rule);
+    RUN_TEST(statuses_are_kept_for_monitors);
+    RUN_TEST(a_single_leaf_is_a_tree);
+    return UNITY_END();
+}

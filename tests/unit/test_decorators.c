@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: MIT */
+/** @file Decorators, leaves' faults, and the validator, against docs/semantics.md. */
+#include "scripted_leaves.h"
+
+static bench_t bench;
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static void start_decorator(canopy_node_type_t type, const int32_t *parameter)
+{
+    static canopy_node_t nodes[] = {INNER(INVERTER, 0, 2, 4, 0), ACTION(0, 1, 0)};
+
+    nodes[0].type = (uint8_t)type;
+    bench_start(&bench, nodes, 2, parameter, 1);
+}
+
+static const int32_t three = 3;
+static const int32_t zero = 0;
+static const int32_t for_ever = -1;
+
+static void inverter_swaps_success_and_failure(void)
+{
+    start_decorator(CANOPY_NODE_INVERTER, &zero);
+    EXPECT("S", CANOPY_FAILURE, "a");
+    EXPECT("F", CANOPY_SUCCESS, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_FAILURE, "a'");
+    EXPECT("K", CANOPY_SKIPPED, "a");
+}
+
+static void retry_makes_one_attempt_a_tick(void)
+{
+    start_decorator(CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL, &three);
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_RUNNING, "a'");
+    EXPECT("F", CANOPY_FAILURE, "a");
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_SUCCESS, "a");
+}
+
+static void retry_counts_anew_after_success_and_halt_but_not_after_skipped(void)
+{
+    start_decorator(CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL, &three);
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_SUCCESS, "a");
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_RUNNING, "a");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_RUNNING, "a");
+    EXPECT("K", CANOPY_SKIPPED, "a");
+    EXPECT("F", CANOPY_FAILURE, "a");
+}
+
+static void retry_never_or_for_ever(void)
+{
+    start_decorator(CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL, &zero);
+    EXPECT("S", CANOPY_FAILURE, "");
+    start_decorator(CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL, &for_ever);
+    for (unsigned attempt = 0; attempt < 100u; attempt++) {
+        EXPECT("F", CANOPY_RUNNING, "a");
+    }
+    EXPECT("S", CANOPY_SUCCESS, "a");
+}
+
+static void retry_counts_beyond_16_bits(void)
+{
+    static const int32_t many = 70000;
+
+    start_decorator(CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL, &many);
+    for (int32_t attempt = 1; attempt < many; attempt++) {
+        EXPECT("F", CANOPY_RUNNING, "a");
+    }
+    EXPECT("F", CANOPY_FAILURE, "a");
+}
+
+static void timeout_asks_the_clock_before_each_further_tick(void)
+{
+    start_decorator(CANOPY_NODE_TIMEOUT, &three);
+    EXPECT_AT(1000, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(3999, "R", CANOPY_RUNNING, "a'");
+    EXPECT_AT(4000, "R", CANOPY_FAILURE, "a!");
+    EXPECT_AT(4001, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(5000, "S", CANOPY_SUCCESS, "a'");
+    EXPECT_AT(9000, "S", CANOPY_SUCCESS, "a");
+}
+
+static void timeout_stops_its_clock_when_the_child_is_skipped(void)
+{
+    start_decorator(CANOPY_NODE_TIMEOUT, &three);
+    EXPECT_AT(0, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(1000, "K", CANOPY_SKIPPED, "a'");
+    EXPECT_AT(3500, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(6499, "R", CANOPY_RUNNING, "a'");
+    EXPECT_AT(6500, "R", CANOPY_FAILURE, "a!");
+}
+
+static void timeout_is_right_across_the_wrap_of_time(void)
+{
+    const canopy_time_t late = UINT64_MAX - 1000u;
+
+    start_decorator(CANOPY_NODE_TIMEOUT, &three);
+    EXPECT_AT(late, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(late + 2999u, "R", CANOPY_RUNNING, "a'");
+    EXPECT_AT(late + 3000u, "R", CANOPY_FAILURE, "a!");
+}
+
+static void timeout_works_while_time_stands_still(void)
+{
+    start_decorator(CANOPY_NODE_TIMEOUT, &zero);
+    EXPECT_AT(7, "S", CANOPY_SUCCESS, "a");
+    EXPECT_AT(7, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(7, "R", CANOPY_FAILURE, "a!");
+}
+
+static void a_wrong_status_of_a_leaf_is_a_failure_and_counted(void)
+{
+    static const canopy_node_t nodes[] = {INNER(FALLBACK, 0, 4, 0, 0), CONDITION(0, 1, 0), SYNC(0, 2, 1),
+                                          ACTION(0, 3, 2)};
+
+    bench_start(&bench, nodes, 4, &zero, 1);
+    EXPECT("RRI", CANOPY_FAILURE, "abc");
+    TEST_ASSERT_EQUAL_UINT32(3, bench.instance.faults);
+    TEST_ASSERT_EQUAL_UINT16(3, bench.instance.fault_node);
+    bench.script.returns[0] = (canopy_status_t)77;
+    bench.script.returns[1] = CANOPY_SUCCESS;
+    TEST_ASSERT_EQUAL(CANOPY_SUCCESS, canopy_tree_tick(&bench.instance, 0));
+    TEST_ASSERT_EQUAL_UINT32(4, bench.instance.faults);
+    TEST_ASSERT_EQUAL_UINT16(1, bench.instance.fault_node);
+}
+
+static void init_refuses_what_it_cannot_use(void)
+{
+    static const canopy_node_t nodes[] = {ACTION(0, 0, 0)};
+    static const canopy_tree_t tree = {.nodes = nodes, .leaves = &script_leaf, .node_count = 1, .leaf_count = 1};
+    static const canopy_tree_t empty = {.nodes = nodes};
+    canopy_tree_instance_t instance;
+    uint8_t status[1];
+
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&instance, &tree, status, NULL, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(NULL, &tree, status, NULL, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, NULL, status, NULL, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &tree, NULL, NULL, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &empty, status, NULL, NULL));
+}
+
+/** Validates a copy of a good table with one field changed. */
+static void refuses(uint16_t node, canopy_node_t wrong)
+{
+    canopy_node_t nodes[] = {INNER(SEQUENCE, 0, 5, 0, 0), ACTION(0, 1, 0), INNER(TIMEOUT, 0, 4, 1, 0), ACTION(2, 3, 1),
+                             ACTION(0, 4, 2)};
+    canopy_tree_t tree = {.nodes = nodes,
+                          .leaves = &script_leaf,
+                          .parameters = &three,
+                          .node_count = 5,
+                          .leaf_count = 1,
+                          .parameter_count = 1,
+                          .word_count = 5};
+    uint16_t bad = UINT16_MAX;
+
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tree, &bad));
+    nodes[node] = wrong;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&tree, &bad));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT16(node, bad);
+}
+
+static void the_validator_refuses_tables_that_a_tick_could_leave(void)
+{
+    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 6, 0, 0));
+    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 4, 0, 0));
+    refuses(0, (canopy_node_t)INNER(SEQUENCE, 1, 5, 0, 0));
+    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 5, 5, 0));
+    refuses(0, (canopy_node_t)INNER(INVERTER, 0, 5, 0, 0));
+    refuses(1, (canopy_node_t)ACTION(1, 1, 0));
+    refuses(1, (canopy_node_t)INNER(SEQUENCE, 0, 2, 0, 0));
+    refuses(1, (canopy_node_t){.type = CANOPY_NODE_TYPES, .end = 2});
+    refuses(1, (canopy_node_t){.type = CANOPY_NODE_CONDITION, .end = 2, .leaf = 1});
+    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 2, 0));
+    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 1, 1));
+    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 5, 1, 0));
+    refuses(3, (canopy_node_t)ACTION(0, 3, 1));
+    refuses(4, (canopy_node_t){.type = CANOPY_NODE_CONDITION, .parent = 0, .end = 4});
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(inverter_swaps_success_and_failure);
+    RUN_TEST(retry_makes_one_attempt_a_tick);
+    RUN_TEST(retry_counts_anew_after_success_and_halt_but_not_after_skipped);
+    RUN_TEST(retry_never_or_for_ever);
+    RUN_TEST(retry_counts_beyond_16_bits);
+    RUN_TEST(timeout_asks_the_clock_before_each_further_tick);
+    RUN_TEST(timeout_stops_its_clock_when_the_child_is_skipped);
+    RUN_TEST(timeout_is_right_across_the_wrap_of_time);
+    RUN_TEST(timeout_works_while_time_stands_still);
+    RUN_TEST(a_wrong_status_of_a_leaf_is_a_failure_and_counted);
+    RUN_TEST(init_refuses_what_it_cannot_use);
+    RUN_TEST(the_validator_refuses_tables_that_a_tick_could_leave);
+    return UNITY_END();
+}
