@@ -54,7 +54,7 @@ def command(
 ) -> None:
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
 
-    Writes NAME.c, NAME.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the host tools.
+    Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the host tools.
     Nothing is written when anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
 
     \b

@@ -185,8 +185,8 @@ def render(application: Application) -> dict[str, str]:
         f"{bus}_bus.h": "bus.h.j2",
         f"{bus}_bus.c": "bus.c.j2",
         f"{name}_leaves.h": "leaves.h.j2",
-        f"{name}.h": "application.h.j2",
-        f"{name}.c": "application.c.j2",
+        f"{name}_app.h": "application.h.j2",
+        f"{name}_app.c": "application.c.j2",
     }
     files = {file: environment.get_template(template).render(context) for file, template in templates.items()}
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
