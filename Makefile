@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+# A few lines over CMakePresets.json and a Python environment in build/venv. `make help` lists the targets.
+MAKEFLAGS += --no-print-directory
+export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
+PYTHON := build/venv/bin/python
+PYTEST := $(PYTHON) -m pytest
+SETUP := host_tools/setup
+BUILD = cmake --preset $(1) && cmake --build --preset $(1)
+
+.PHONY: help demo test lint format check-all clean test-host test-firmware test-python test-rig test-clang test-asan
+.NOTPARALLEL:
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
+
+demo: ## build both example applications and watch them bring the robot home (under a minute)
+	$(SETUP)/ensure-packages demo
+	$(SETUP)/make-venv --try lcm can
+	$(call BUILD,demo)
+	build/venv/bin/canopy demo --build-dir build/host
+
+test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
+	$(SETUP)/ensure-packages test
+	$(SETUP)/make-venv can,lcm,test
+	@$(MAKE) test-host test-firmware test-python test-rig
+
+test-host: # unit tests on this machine
+	$(call BUILD,host)
+	ctest --preset host
+
+test-firmware: # the same tests on QEMU's Cortex-M4, and the sizes for Cortex-M0+ and Cortex-M4
+	$(call BUILD,firmware-m0plus)
+	$(call BUILD,firmware-m4)
+	ctest --preset firmware-m0plus
+	ctest --preset firmware-m4
+	cmake --build --preset firmware-m0plus --target sizes
+	cmake --build --preset firmware-m4 --target sizes
+
+test-python: # Python and integration tests that need no CAN interface
+	$(PYTEST) -m "not rig"
+
+test-rig: # integration tests on vcan0: one guest for all of them
+	$(PYTHON) tests/rig/with-vcan --timeout 600 --mem 1G -- $(PYTEST) -m rig
+
+lint: ## formatters, linters and type checker; nothing is changed
+	$(SETUP)/ensure-packages lint
+	$(SETUP)/make-venv can,lcm,test,lint
+	$(call BUILD,host)
+	$(SETUP)/lint
+
+format: ## let clang-format and ruff rewrite the sources
+	$(SETUP)/ensure-packages demo
+	$(SETUP)/make-venv can,lcm,test,lint
+	$(SETUP)/lint --fix
+
+check-all: ## what takes longer: clang, and the sanitizers under every test that needs no CAN interface
+	$(SETUP)/ensure-packages check-all
+	$(SETUP)/make-venv can,lcm,test
+	@$(MAKE) test-clang test-asan
+
+test-clang:
+	$(call BUILD,clang)
+	ctest --preset clang
+
+test-asan:
+	$(call BUILD,asan)
+	ctest --preset asan
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration
+
+clean: ## remove everything that was built
+	rm -rf build

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: MIT
+# CANOPY_PYTHON: the interpreter that runs `canopy compile` and lcm-gen's environment in the build; it must have the
+# package canopy-bt. The Makefile puts it into build/venv, and the presets point there.
+if(NOT CANOPY_PYTHON)
+    find_package(Python3 3.10 COMPONENTS Interpreter REQUIRED)
+    set(CANOPY_PYTHON "${Python3_EXECUTABLE}" CACHE FILEPATH "Python interpreter with the package canopy-bt")
+endif()
+if(NOT EXISTS "${CANOPY_PYTHON}")
+    message(FATAL_ERROR "CANOPY_PYTHON is ${CANOPY_PYTHON}, which does not exist. Run `make venv`, or set "
+        "-DCANOPY_PYTHON= to an interpreter that has the package of host_tools/ (pip install ./host_tools).")
+endif()
