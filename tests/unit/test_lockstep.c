@@ -12,7 +12,7 @@
 
 /* The inner driver: gives script[], one frame at each wait; without frames a wait just passes. */
 static struct {
-    canopy_can_frame_t script[300];
+    canopy_can_frame_t script[CANOPY_LOCKSTEP_FRAMES + 8u];
     uint32_t length;
     uint32_t next;
     uint32_t waiting; /* frames that receive() may give now */

@@ -32,14 +32,18 @@ void tearDown(void)
 {
 }
 
-static void *produce(void *patient)
+static bool is_patient = true;
+static bool is_hasty = false;
+
+static void *produce(void *context)
 {
+    const bool patient = *(const bool *)context;
     for (uint32_t number = 0; number < ELEMENTS; number++) {
         element_t element = {.number = number};
         for (size_t i = 0; i < 15; i++) {
             element.copies[i] = number;
         }
-        while (!canopy_ring_push(&ring, &element) && patient != NULL) {
+        while (!canopy_ring_push(&ring, &element) && patient) {
             (void)sched_yield();
         }
     }
@@ -75,7 +79,7 @@ static uint32_t consume(bool all_expected)
 static void test_patient_producer_loses_nothing(void)
 {
     pthread_t producer;
-    TEST_ASSERT_EQUAL(0, pthread_create(&producer, NULL, produce, &producer));
+    TEST_ASSERT_EQUAL(0, pthread_create(&producer, NULL, produce, &is_patient));
     const uint32_t count = consume(true);
     TEST_ASSERT_EQUAL(0, pthread_join(producer, NULL));
 
@@ -86,7 +90,7 @@ static void test_patient_producer_loses_nothing(void)
 static void test_hasty_producer_loses_what_is_counted(void)
 {
     pthread_t producer;
-    TEST_ASSERT_EQUAL(0, pthread_create(&producer, NULL, produce, NULL));
+    TEST_ASSERT_EQUAL(0, pthread_create(&producer, NULL, produce, &is_hasty));
     const uint32_t count = consume(false);
     TEST_ASSERT_EQUAL(0, pthread_join(producer, NULL));
 

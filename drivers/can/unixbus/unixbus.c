@@ -1,0 +1,295 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * Virtual CAN bus over Unix datagram sockets; the contract is in unixbus.h, the protocol in docs/unixbus.md.
+ */
+#include "canopy/can/unixbus.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include "unixbus_internal.h"
+
+static int64_t monotonic_us(void)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+/* Cannot fail but by overflow of the 64-bit count, and then the waiter is awake already. */
+static void wake_loop(const canopy_unixbus_t *self)
+{
+    const uint64_t one = 1;
+    const ssize_t written = write(self->event, &one, sizeof one);
+    (void)written;
+}
+
+static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_t size)
+{
+    canopy_can_frame_t frame;
+    if (!canopy_unixbus_decode(&frame, datagram, size)) {
+        atomic_fetch_add_explicit(&self->malformed, 1u, memory_order_relaxed);
+        return;
+    }
+    if ((frame.flags & CANOPY_CAN_ERROR) != 0) {
+        atomic_fetch_add_explicit(&self->error_frames, 1u, memory_order_relaxed);
+    }
+    if (canopy_can_accepts(self->acceptance, &frame) && canopy_ring_push(&self->queue, &frame)) {
+        wake_loop(self);
+    }
+}
+
+/** The receive "interrupt". Ends when canopy_unixbus_close() shuts the socket's reading side. */
+static void *receive_thread(void *context)
+{
+    canopy_unixbus_t *self = context;
+    for (;;) {
+        uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX + 1u]; /* one more: what is too long must not look right */
+        const ssize_t size = recv(self->socket, datagram, sizeof datagram, 0);
+        if (atomic_load(&self->stopping)) {
+            return NULL;
+        }
+        if (size >= 0) {
+            take_datagram(self, datagram, (size_t)size);
+        } else if (errno != EINTR) {
+            atomic_store(&self->failure, errno);
+            wake_loop(self);
+            return NULL;
+        }
+    }
+}
+
+static int unixbus_receive(void *context, canopy_can_frame_t *frame)
+{
+    canopy_unixbus_t *self = context;
+    if (canopy_ring_pop(&self->queue, frame)) {
+        self->received++;
+        return 1;
+    }
+    return atomic_load(&self->failure) == 0 ? 0 : CANOPY_ERROR_IO;
+}
+
+static int unixbus_wait(void *context, uint32_t timeout_us)
+{
+    canopy_unixbus_t *self = context;
+    const int64_t end = monotonic_us() + timeout_us;
+    for (;;) {
+        /* Cleared before the look at the queue: a frame that comes after the look counts the event up again. */
+        uint64_t events;
+        const ssize_t cleared = read(self->event, &events, sizeof events);
+        (void)cleared;
+        if (canopy_ring_count(&self->queue) > 0u) {
+            return 1;
+        }
+        if (atomic_load(&self->failure) != 0) {
+            return CANOPY_ERROR_IO;
+        }
+        const int64_t left = end - monotonic_us();
+        if (left <= 0) {
+            return 0;
+        }
+        const struct timespec timeout = {.tv_sec = (time_t)(left / 1000000), .tv_nsec = (long)(left % 1000000) * 1000L};
+        struct pollfd descriptor = {.fd = self->event, .events = POLLIN};
+        if (ppoll(&descriptor, 1, &timeout, NULL) < 0) {
+            return errno == EINTR ? 0 : CANOPY_ERROR_IO;
+        }
+    }
+}
+
+/** Sends to a participant that is full, waiting at most wait_us. @return as sendto(), with errno. */
+static ssize_t send_waiting(const canopy_unixbus_t *self, const canopy_unixbus_peer_t *peer, const uint8_t *datagram,
+                            size_t size, int64_t wait_us)
+{
+    const struct timeval timeout = {.tv_sec = (time_t)(wait_us / 1000000), .tv_usec = (suseconds_t)(wait_us % 1000000)};
+    if (wait_us <= 0 || setsockopt(self->socket, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout) != 0) {
+        errno = EAGAIN; /* a timeout of 0 would mean for ever */
+        return -1;
+    }
+    return sendto(self->socket, datagram, size, MSG_NOSIGNAL, (const struct sockaddr *)&peer->address,
+                  sizeof peer->address);
+}
+
+/** What became of a frame at one participant. */
+typedef enum { TAKEN, LOST, GONE } delivery_t;
+
+/** Sends to one participant. *end is when this send's waiting must be over [µs]; 0: it has not begun. */
+static delivery_t deliver(canopy_unixbus_t *self, canopy_unixbus_peer_t *peer, const uint8_t *datagram, size_t size,
+                          int64_t *end)
+{
+    ssize_t written = sendto(self->socket, datagram, size, MSG_NOSIGNAL | MSG_DONTWAIT,
+                             (const struct sockaddr *)&peer->address, sizeof peer->address);
+    if (written < 0 && (errno == EAGAIN || errno == EWOULDBLOCK) && !peer->slow) {
+        const int64_t now = monotonic_us();
+        *end = *end == 0 ? now + CANOPY_UNIXBUS_SEND_WAIT_US : *end;
+        /* Only one that had a real chance is called slow, not one for which an earlier one left no time. */
+        const bool chance = *end - now > CANOPY_UNIXBUS_SEND_WAIT_US / 2;
+        written = send_waiting(self, peer, datagram, size, *end - now);
+        peer->slow = written < 0 && chance && (errno == EAGAIN || errno == EWOULDBLOCK);
+    }
+    if (written >= 0) {
+        peer->slow = false;
+        return TAKEN;
+    }
+    if (errno == ECONNREFUSED) {
+        (void)unlink(peer->address.sun_path); /* its owner died without closing */
+        return GONE;
+    }
+    /* ENOENT, EPIPE: it is leaving the bus in good order. */
+    return errno == ENOENT || errno == EPIPE ? GONE : LOST;
+}
+
+static int unixbus_send(void *context, const canopy_can_frame_t *frame)
+{
+    canopy_unixbus_t *self = context;
+    uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX];
+    uint32_t taken = 0;
+    uint32_t lost = 0;
+    int64_t end = 0;
+    if (!canopy_can_frame_can_be_sent(frame)) {
+        self->tx_dropped++;
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    const canopy_error_t error = canopy_unixbus_folder_refresh(&self->folder);
+    if (error != CANOPY_OK) {
+        self->tx_dropped++;
+        return error;
+    }
+    const size_t size = canopy_unixbus_encode(datagram, frame);
+    for (size_t i = 0; i < self->folder.count;) {
+        const delivery_t delivery = deliver(self, &self->folder.peers[i], datagram, size, &end);
+        taken += delivery == TAKEN;
+        lost += delivery == LOST;
+        if (delivery == GONE) {
+            canopy_unixbus_folder_forget(&self->folder, i);
+        } else {
+            i++;
+        }
+    }
+    lost += self->folder.too_many;
+    self->tx_dropped += lost;
+    if (taken == 0u && lost > 0u) {
+        return 0;
+    }
+    self->sent++;
+    return 1;
+}
+
+static void unixbus_stats(void *context, canopy_can_stats_t *stats)
+{
+    const canopy_unixbus_t *self = context;
+    *stats = (canopy_can_stats_t){
+        .received = self->received,
+        .sent = self->sent,
+        .rx_dropped = canopy_ring_dropped(&self->queue),
+        .tx_dropped = self->tx_dropped,
+        .error_frames = atomic_load_explicit(&self->error_frames, memory_order_relaxed),
+        .rx_high_water = canopy_ring_high_water(&self->queue),
+    };
+}
+
+/* The thread starts with all signals blocked: they are for the loop's thread, whose sleep they shall end. */
+static canopy_error_t start_thread(canopy_unixbus_t *self)
+{
+    sigset_t all;
+    sigset_t before;
+    (void)sigfillset(&all);
+    int number = pthread_sigmask(SIG_SETMASK, &all, &before);
+    if (number == 0) {
+        number = pthread_create(&self->thread, NULL, receive_thread, self);
+        (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
+    }
+    errno = number;
+    return number == 0 ? CANOPY_OK : CANOPY_ERROR_IO;
+}
+
+static void close_descriptors(canopy_unixbus_t *self)
+{
+    if (self->event >= 0) {
+        (void)close(self->event);
+        self->event = -1;
+    }
+    if (self->socket >= 0) {
+        (void)close(self->socket);
+        self->socket = -1;
+    }
+}
+
+static canopy_error_t join_bus(canopy_unixbus_t *self)
+{
+    self->socket = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    self->event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (self->socket < 0 || self->event < 0) {
+        return CANOPY_ERROR_IO;
+    }
+    canopy_error_t error = canopy_unixbus_folder_join(&self->folder, self->socket);
+    if (error != CANOPY_OK) {
+        return error;
+    }
+    error = start_thread(self);
+    if (error != CANOPY_OK) {
+        (void)unlink(self->folder.own.sun_path);
+    }
+    return error;
+}
+
+canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, const canopy_can_acceptance_t *acceptance)
+{
+    if (self == NULL || bus == NULL || !canopy_can_acceptance_is_valid(acceptance)) {
+        errno = EINVAL;
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    self->can = (canopy_can_t){
+        .context = self,
+        .receive = unixbus_receive,
+        .send = unixbus_send,
+        .wait = unixbus_wait,
+        .stats = unixbus_stats,
+    };
+    self->acceptance = acceptance;
+    self->socket = -1;
+    self->event = -1;
+    atomic_init(&self->stopping, false);
+    atomic_init(&self->failure, 0);
+    atomic_init(&self->malformed, 0u);
+    atomic_init(&self->error_frames, 0u);
+    self->received = 0u;
+    self->sent = 0u;
+    self->tx_dropped = 0u;
+    canopy_error_t error = canopy_ring_init(&self->queue, self->storage, sizeof self->storage, sizeof self->storage[0],
+                                            CANOPY_UNIXBUS_FRAMES);
+    if (error == CANOPY_OK) {
+        error = canopy_unixbus_folder_init(&self->folder, bus);
+    }
+    if (error == CANOPY_OK) {
+        error = join_bus(self);
+    }
+    if (error != CANOPY_OK) {
+        const int number = errno;
+        close_descriptors(self);
+        errno = number;
+    }
+    return error;
+}
+
+void canopy_unixbus_close(canopy_unixbus_t *self)
+{
+    if (self->socket < 0) {
+        return;
+    }
+    (void)unlink(self->folder.own.sun_path);
+    atomic_store(&self->stopping, true);
+    (void)shutdown(self->socket, SHUT_RD);
+    (void)pthread_join(self->thread, NULL);
+    close_descriptors(self);
+}
+
+uint32_t canopy_unixbus_malformed(const canopy_unixbus_t *self)
+{
+    return atomic_load_explicit(&self->malformed, memory_order_relaxed);
+}

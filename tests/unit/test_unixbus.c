@@ -1,0 +1,441 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * The unixbus driver against itself and against bare sockets that keep to the protocol, or do not.
+ */
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "canopy/can/unixbus.h"
+#include "unity.h"
+
+#define SECOND_US 1000000u
+
+static canopy_unixbus_t a, b;
+static char base[64];
+static char folder[80]; /* of the bus "bus0" */
+
+void setUp(void)
+{
+    (void)snprintf(base, sizeof base, "/tmp/canopy-test-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(base));
+    TEST_ASSERT_EQUAL(0, setenv("CANOPY_BUS_DIR", base, 1)); /* NOLINT(concurrency-mt-unsafe): no thread yet */
+    (void)snprintf(folder, sizeof folder, "%s/bus0", base);
+    a.socket = -1;
+    b.socket = -1;
+}
+
+/** Calls visit for each file of the bus's folder, if it is given. @return their number */
+static unsigned each_file(void (*visit)(const char *path))
+{
+    unsigned count = 0;
+    DIR *directory = opendir(folder);
+    if (directory == NULL) {
+        return 0;
+    }
+    const struct dirent *entry;
+    while ((entry = readdir(directory)) != NULL) { /* NOLINT(concurrency-mt-unsafe): the stream is ours alone */
+        if (entry->d_name[0] != '.') {
+            char path[400];
+            (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+            count++;
+            if (visit != NULL) {
+                visit(path);
+            }
+        }
+    }
+    (void)closedir(directory);
+    return count;
+}
+
+static void delete_file(const char *path)
+{
+    (void)unlink(path);
+}
+
+void tearDown(void)
+{
+    canopy_unixbus_close(&a);
+    canopy_unixbus_close(&b);
+    (void)each_file(delete_file);
+    (void)rmdir(folder);
+    (void)rmdir(base);
+}
+
+static void open_bus(canopy_unixbus_t *bus, const canopy_can_acceptance_t *acceptance)
+{
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_unixbus_open(bus, "bus0", acceptance));
+}
+
+static int send_id(canopy_unixbus_t *bus, uint32_t id)
+{
+    const canopy_can_frame_t frame = {.id = id, .length = 1, .data = {(uint8_t)id}};
+    return bus->can.send(bus->can.context, &frame);
+}
+
+static canopy_can_frame_t receive_waiting(canopy_unixbus_t *bus)
+{
+    canopy_can_frame_t frame = {0};
+    TEST_ASSERT_EQUAL_MESSAGE(1, bus->can.wait(bus->can.context, 10 * SECOND_US), "no frame came");
+    TEST_ASSERT_EQUAL(1, bus->can.receive(bus->can.context, &frame));
+    return frame;
+}
+
+static void expect_silence(canopy_unixbus_t *bus)
+{
+    canopy_can_frame_t frame;
+    TEST_ASSERT_EQUAL(0, bus->can.wait(bus->can.context, 20000));
+    TEST_ASSERT_EQUAL(0, bus->can.receive(bus->can.context, &frame));
+}
+
+static canopy_can_stats_t stats(canopy_unixbus_t *bus)
+{
+    canopy_can_stats_t result;
+    bus->can.stats(bus->can.context, &result);
+    return result;
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+    TEST_ASSERT_EQUAL(0, clock_gettime(CLOCK_MONOTONIC, &now));
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static int new_socket(void)
+{
+    const int descriptor = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (descriptor < 0) {
+        perror("socket");
+        abort();
+    }
+    return descriptor;
+}
+
+/** A participant without a driver: a bound socket that nobody reads. */
+static int bare_socket(const char *name)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int descriptor = new_socket();
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/%s", folder, name);
+    TEST_ASSERT_EQUAL(0, bind(descriptor, (const struct sockaddr *)&address, sizeof address));
+    return descriptor;
+}
+
+/** Sends bytes as they are to the driver `a`. */
+static void send_bytes(const void *bytes, size_t size)
+{
+    const int descriptor = new_socket();
+    TEST_ASSERT_EQUAL((ssize_t)size,
+                      sendto(descriptor, bytes, size, 0, (const struct sockaddr *)&a.folder.own, sizeof a.folder.own));
+    (void)close(descriptor);
+}
+
+static void test_frames_go_both_ways_and_not_to_the_sender(void)
+{
+    open_bus(&a, NULL);
+    open_bus(&b, NULL);
+
+    TEST_ASSERT_EQUAL(1, send_id(&a, 0x123));
+    TEST_ASSERT_EQUAL_HEX32(0x123, receive_waiting(&b).id);
+    TEST_ASSERT_EQUAL(1, send_id(&b, 0x321));
+    TEST_ASSERT_EQUAL_HEX32(0x321, receive_waiting(&a).id);
+    expect_silence(&a);
+    expect_silence(&b);
+    TEST_ASSERT_EQUAL_UINT32(1, stats(&a).sent);
+    TEST_ASSERT_EQUAL_UINT32(1, stats(&a).received);
+    TEST_ASSERT_EQUAL_UINT32(1, stats(&a).rx_high_water);
+}
+
+static void test_every_kind_of_frame_arrives_as_it_was_sent(void)
+{
+    canopy_can_frame_t frames[] = {
+        {.id = 0x7FF, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}},
+        {.id = 0x1FFFFFFF, .flags = CANOPY_CAN_EXTENDED, .length = 0},
+        {.id = 0x123, .flags = CANOPY_CAN_REMOTE, .length = 5},
+        {.id = 0x456, .flags = CANOPY_CAN_FD | CANOPY_CAN_BITRATE_SWITCH | CANOPY_CAN_ERROR_STATE, .length = 64},
+    };
+    memset(frames[3].data, 0xA5, 64);
+    open_bus(&a, NULL);
+    open_bus(&b, NULL);
+
+    for (size_t i = 0; i < sizeof frames / sizeof frames[0]; i++) {
+        TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frames[i]));
+        const canopy_can_frame_t frame = receive_waiting(&b);
+        TEST_ASSERT_EQUAL_HEX32(frames[i].id, frame.id);
+        TEST_ASSERT_EQUAL_HEX8(frames[i].flags, frame.flags);
+        TEST_ASSERT_EQUAL_UINT8(frames[i].length, frame.length);
+        if ((frame.flags & CANOPY_CAN_REMOTE) == 0 && frame.length > 0) {
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(frames[i].data, frame.data, frame.length);
+        }
+    }
+}
+
+static void test_datagram_is_the_one_of_the_documentation(void)
+{
+    static const uint8_t expected[] = {0x01, 0x00, 0x02, 0x00, 0x23, 0x01, 0x00, 0x00, 0x11, 0x22};
+    const canopy_can_frame_t frame = {.id = 0x123, .length = 2, .data = {0x11, 0x22}};
+    uint8_t bytes[100];
+    open_bus(&a, NULL);
+    const int peer = bare_socket("1-00c0ffee.sock");
+
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(sizeof expected, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, sizeof expected);
+    (void)close(peer);
+}
+
+static void test_malformed_datagrams_are_counted_and_change_nothing(void)
+{
+    static const uint8_t good[] = {1, 0, 2, 0, 0x23, 1, 0, 0, 0x11, 0x22};
+    static const struct {
+        uint8_t place;
+        uint8_t value;
+    } changes[] = {{0, 2}, {1, 64}, {1, CANOPY_CAN_BITRATE_SWITCH}, {2, 3}, {2, 1}, {2, 9}, {3, 1}, {5, 8}};
+    uint8_t bytes[200] = {0};
+    uint32_t count = 0;
+    open_bus(&a, NULL);
+
+    for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++, count++) {
+        memcpy(bytes, good, sizeof good);
+        bytes[changes[i].place] = changes[i].value;
+        send_bytes(bytes, sizeof good);
+    }
+    memcpy(bytes, good, sizeof good);
+    for (size_t size = 0; size < sizeof good; size++, count++) {
+        send_bytes(bytes, size);
+    }
+    send_bytes(bytes, sizeof good + 1);
+    send_bytes(bytes, sizeof bytes);
+    count += 2;
+    send_bytes(good, sizeof good);
+
+    TEST_ASSERT_EQUAL_HEX32(0x123, receive_waiting(&a).id);
+    expect_silence(&a);
+    TEST_ASSERT_EQUAL_UINT32(count, canopy_unixbus_malformed(&a));
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).rx_dropped);
+}
+
+static void test_filter_and_error_frames(void)
+{
+    static const uint32_t ids[] = {0x100, 0x200 | CANOPY_CAN_ACCEPT_EXTENDED};
+    static const canopy_can_acceptance_t acceptance = {.ids = ids, .count = 2};
+    static const uint8_t error[] = {1, CANOPY_CAN_ERROR, 8, 0, 0x40, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    open_bus(&a, &acceptance);
+    open_bus(&b, NULL);
+
+    TEST_ASSERT_EQUAL(1, send_id(&b, 0x101));
+    TEST_ASSERT_EQUAL(1, send_id(&b, 0x200));
+    send_bytes(error, sizeof error);
+    TEST_ASSERT_EQUAL(1, send_id(&b, 0x100));
+
+    TEST_ASSERT_EQUAL_HEX32(0x100, receive_waiting(&a).id);
+    expect_silence(&a);
+    TEST_ASSERT_EQUAL_UINT32(1, stats(&a).error_frames);
+}
+
+static void test_frame_that_no_bus_can_carry_is_refused(void)
+{
+    const canopy_can_frame_t frame = {.id = 1, .flags = CANOPY_CAN_FD, .length = 9};
+    open_bus(&a, NULL);
+
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, send_id(&a, 0x800));
+    TEST_ASSERT_EQUAL_UINT32(2, stats(&a).tx_dropped);
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).sent);
+}
+
+/* Joining and sending within one step of the clock that stamps folders. */
+static void test_newcomers_are_reached_at_once(void)
+{
+    open_bus(&a, NULL);
+    for (uint32_t i = 0; i < 50; i++) {
+        TEST_ASSERT_EQUAL(1, send_id(&a, 0x10));
+        open_bus(&b, NULL);
+        TEST_ASSERT_EQUAL(1, send_id(&a, 0x100 + i));
+        TEST_ASSERT_EQUAL_HEX32(0x100 + i, receive_waiting(&b).id);
+        canopy_unixbus_close(&b);
+    }
+    TEST_ASSERT_EQUAL_UINT32(100, stats(&a).sent);
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).tx_dropped);
+}
+
+static void test_socket_of_a_dead_participant_is_removed_and_other_files_are_not(void)
+{
+    open_bus(&a, NULL);
+    (void)close(bare_socket("1-00c0ffee.sock"));
+    (void)close(bare_socket("stranger.sock"));
+    (void)close(bare_socket("1-00c0ffee.new"));
+    TEST_ASSERT_EQUAL(4, each_file(NULL));
+
+    TEST_ASSERT_EQUAL(1, send_id(&a, 1));
+
+    TEST_ASSERT_EQUAL(3, each_file(NULL));
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).tx_dropped);
+}
+
+static void test_full_participant_costs_one_wait_until_it_takes_frames_again(void)
+{
+    uint8_t bytes[100];
+    uint32_t taken = 0;
+    open_bus(&a, NULL);
+    open_bus(&b, NULL);
+    const int peer = bare_socket("1-00c0ffee.sock");
+
+    const double start = seconds();
+    for (uint32_t i = 0; i < 1000; i++) {
+        TEST_ASSERT_EQUAL(1, send_id(&a, 0x100)); /* taken by b all the while */
+        (void)receive_waiting(&b);
+    }
+    const double first = seconds() - start;
+    TEST_ASSERT_TRUE_MESSAGE(first >= 0.09, "did not wait for the full participant");
+    TEST_ASSERT_TRUE_MESSAGE(first < 5.0, "waited again for a participant that stayed full");
+
+    while (recv(peer, bytes, sizeof bytes, MSG_DONTWAIT) > 0) {
+        taken++;
+    }
+    TEST_ASSERT_EQUAL_UINT32(1000, taken + stats(&a).tx_dropped);
+    TEST_ASSERT_GREATER_THAN_UINT32(0, taken);
+
+    TEST_ASSERT_EQUAL(1, send_id(&a, 0x200));
+    TEST_ASSERT_GREATER_THAN(0, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
+    TEST_ASSERT_FALSE(a.folder.peers[0].slow || a.folder.peers[1].slow);
+    (void)close(peer);
+}
+
+static void test_several_full_participants_cost_one_wait_together(void)
+{
+    int peers[8];
+    open_bus(&a, NULL);
+    for (unsigned i = 0; i < 8; i++) {
+        char name[32];
+        (void)snprintf(name, sizeof name, "%u-00c0ffee.sock", i);
+        peers[i] = bare_socket(name);
+    }
+    double longest = 0;
+    unsigned refused = 0;
+    for (unsigned i = 0; i < 40; i++) {
+        const double start = seconds();
+        refused += send_id(&a, 1) == 0;
+        longest = seconds() - start > longest ? seconds() - start : longest;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(longest < 0.5, "one send waited for each of the full participants");
+    TEST_ASSERT_GREATER_THAN_UINT32(0, refused);
+    TEST_ASSERT_EQUAL_UINT32(40, refused + stats(&a).sent);
+    for (unsigned i = 0; i < 8; i++) {
+        (void)close(peers[i]);
+    }
+}
+
+static void test_loop_that_does_not_receive_loses_the_newest_and_counts(void)
+{
+    open_bus(&a, NULL);
+    open_bus(&b, NULL);
+    for (uint32_t i = 0; i < CANOPY_UNIXBUS_FRAMES + 100u; i++) {
+        TEST_ASSERT_EQUAL(1, send_id(&a, i & 0x7FFu));
+    }
+    for (int tries = 0; stats(&b).rx_dropped < 100u && tries < 5000; tries++) {
+        (void)nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+    TEST_ASSERT_EQUAL_UINT32(100, stats(&b).rx_dropped);
+    TEST_ASSERT_EQUAL_UINT32(CANOPY_UNIXBUS_FRAMES, stats(&b).rx_high_water);
+    for (uint32_t i = 0; i < CANOPY_UNIXBUS_FRAMES; i++) {
+        TEST_ASSERT_EQUAL_HEX32(i & 0x7FFu, receive_waiting(&b).id);
+    }
+    expect_silence(&b);
+}
+
+static void test_wait_lasts_as_long_as_asked(void)
+{
+    open_bus(&a, NULL);
+    open_bus(&b, NULL);
+    TEST_ASSERT_EQUAL(1, send_id(&b, 1));
+    (void)receive_waiting(&a); /* leaves no event behind that would cut the next wait short */
+
+    const double start = seconds();
+    TEST_ASSERT_EQUAL(0, a.can.wait(a.can.context, 50000));
+    TEST_ASSERT_TRUE(seconds() - start >= 0.05);
+}
+
+static void test_deleted_folder_is_told(void)
+{
+    open_bus(&a, NULL);
+    TEST_ASSERT_EQUAL(1, send_id(&a, 1));
+    (void)each_file(delete_file);
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send_id(&a, 1));
+    TEST_ASSERT_EQUAL(0, rmdir(folder));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send_id(&a, 1));
+    TEST_ASSERT_EQUAL_UINT32(2, stats(&a).tx_dropped);
+}
+
+static void test_close_removes_the_socket_and_can_be_repeated(void)
+{
+    open_bus(&a, NULL);
+    TEST_ASSERT_EQUAL(1, each_file(NULL));
+    canopy_unixbus_close(&a);
+    canopy_unixbus_close(&a);
+    TEST_ASSERT_EQUAL(0, each_file(NULL));
+    open_bus(&a, NULL);
+    TEST_ASSERT_EQUAL(1, each_file(NULL));
+}
+
+static void test_open_refuses_bad_names(void)
+{
+    static const canopy_can_acceptance_t bad = {.ids = NULL, .count = 1};
+    char name[200];
+    memset(name, 'x', sizeof name);
+    name[sizeof name - 1] = '\0';
+
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, NULL, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "", NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "..", NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "bus0", &bad));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, NULL));
+    TEST_ASSERT_EQUAL(ENAMETOOLONG, errno);
+    name[90 - strlen(base)] = '\0'; /* the folder's path fits, the socket's does not */
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, NULL));
+    TEST_ASSERT_EQUAL(ENAMETOOLONG, errno);
+    (void)snprintf(folder, sizeof folder, "%.60s/none/bus", base);
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_unixbus_open(&a, folder, NULL));
+}
+
+static void test_path_names_the_folder_itself(void)
+{
+    open_bus(&a, NULL);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_unixbus_open(&b, folder, NULL));
+    TEST_ASSERT_EQUAL(1, send_id(&a, 0x42));
+    TEST_ASSERT_EQUAL_HEX32(0x42, receive_waiting(&b).id);
+    struct stat status;
+    TEST_ASSERT_EQUAL(0, stat(folder, &status));
+    TEST_ASSERT_EQUAL_HEX32(0700, status.st_mode & 07777u);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_frames_go_both_ways_and_not_to_the_sender);
+    RUN_TEST(test_every_kind_of_frame_arrives_as_it_was_sent);
+    RUN_TEST(test_datagram_is_the_one_of_the_documentation);
+    RUN_TEST(test_malformed_datagrams_are_counted_and_change_nothing);
+    RUN_TEST(test_filter_and_error_frames);
+    RUN_TEST(test_frame_that_no_bus_can_carry_is_refused);
+    RUN_TEST(test_newcomers_are_reached_at_once);
+    RUN_TEST(test_socket_of_a_dead_participant_is_removed_and_other_files_are_not);
+    RUN_TEST(test_full_participant_costs_one_wait_until_it_takes_frames_again);
+    RUN_TEST(test_several_full_participants_cost_one_wait_together);
+    RUN_TEST(test_loop_that_does_not_receive_loses_the_newest_and_counts);
+    RUN_TEST(test_wait_lasts_as_long_as_asked);
+    RUN_TEST(test_deleted_folder_is_told);
+    RUN_TEST(test_close_removes_the_socket_and_can_be_repeated);
+    RUN_TEST(test_open_refuses_bad_names);
+    RUN_TEST(test_path_names_the_folder_itself);
+    return UNITY_END();
+}
