@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""`canopy monitor`: a controller's tree and signals, live from its CAN bus."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import can
+import click
+
+from canopy.canbus import CanBusError, is_plain_data, open_bus
+from canopy.model import ModelError, load_model
+from canopy.stop import StopFlag
+from canopy.view import Display, make_display
+from canopy.watch import Watch
+
+_POLL_S = 0.05
+
+
+def run(watch: Watch, bus: can.BusABC, display: Display, stop: StopFlag, duration: float | None, title: str) -> None:
+    """Shows what the bus tells until a signal comes or `duration` [s] is over.
+
+    Raises:
+        can.CanError: The bus has failed.
+    """
+    end = None if duration is None else time.monotonic() + duration
+    while not stop and (end is None or time.monotonic() < end):
+        message = bus.recv(_POLL_S)
+        now = time.monotonic()
+        views = watch.idle(now)
+        if message is not None and is_plain_data(message):
+            views += watch.feed(message.arbitration_id, bytes(message.data), now)
+        display.show(watch, now, bool(views), title)
+
+
+@click.command(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="""\b
+Examples:
+  canopy monitor --model build/host/examples/nao/generated/nao_home/nao_home.model.json --can socketcan:vcan0
+  canopy monitor --model nao_home.model.json --can unixbus:bus0 --json --period 0 | head
+""",
+)
+@click.option("--model", "model_path", type=click.Path(path_type=Path), required=True, help="<application>.model.json")
+@click.option("--can", "bus_name", required=True, help="socketcan:vcan0, unixbus:bus0 or unixbus:/a/folder")
+@click.option(
+    "--period",
+    type=click.FloatRange(0, 3600),
+    default=1.0,
+    show_default=True,
+    help="Lines and JSON: one every so many seconds; 0: one for each tick.",
+)
+@click.option("--duration", type=click.FloatRange(0, min_open=True), help="End after so many seconds.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line.")
+def command(model_path: Path, bus_name: str, period: float, duration: float | None, as_json: bool) -> None:
+    """Watch a controller's tree and signals live.
+
+    In a terminal it draws the tree with its statuses, the signals the controller receives and sends, and what was lost
+    on the way. Into a file or a pipe it prints lines. It only listens. Runs until Ctrl-C.
+
+    Exit status: 0 done, 1 the model or the bus cannot be used, 2 wrong command line.
+    """
+    with StopFlag() as stop:
+        try:
+            watch = Watch(load_model(model_path))
+            with open_bus(bus_name) as bus, make_display(as_json, period) as display:
+                run(watch, bus, display, stop, duration, f"{watch.model.application} on {bus_name}  (Ctrl-C ends)")
+        except (ModelError, CanBusError, can.CanError) as error:
+            click.echo(f"canopy monitor: {error}", err=True)
+            sys.exit(1)

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""How a watched controller looks in a terminal, as lines of text, and as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from types import TracebackType
+from typing import Protocol
+
+import click
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from canopy.model import Node
+from canopy.trace import Status, TreeView, status_name
+from canopy.watch import Watch
+
+_STYLES = {
+    Status.UNKNOWN: "bright_black",
+    Status.IDLE: "bright_black",
+    Status.RUNNING: "bold yellow",
+    Status.SUCCESS: "bold green",
+    Status.FAILURE: "bold red",
+    Status.SKIPPED: "magenta",
+}
+_SYMBOLS = {"Sequence": ("→", "->"), "Fallback": ("?", "?"), "Parallel": ("⇉", "=>")}
+_LEAF_NAMES_IN_A_LINE = 6
+_REDRAW_S = 0.1
+
+
+def symbol(node: Node, ascii_only: bool = False) -> str:
+    """The paper's sign of a control node; the type's name for others that have children."""
+    for part, signs in _SYMBOLS.items():
+        if node.category == "control" and part in node.type:
+            return signs[ascii_only]
+    return node.type
+
+
+def line(watch: Watch, now: float) -> str:
+    """The controller in one line without colours: tick, leaves that are not idle, signals, what was lost."""
+    view = watch.view
+    if view is None:
+        return f"{watch.model.application}: no trace yet"
+    active = [
+        f"{node.name} {status_name(code)}"
+        for node, code in zip(watch.model.nodes, view.statuses, strict=True)
+        if node.category in ("condition", "action") and code != Status.IDLE and code <= Status.SKIPPED
+    ]
+    more = f", {len(active) - _LEAF_NAMES_IN_A_LINE} more" if len(active) > _LEAF_NAMES_IN_A_LINE else ""
+    readings = watch.signals.readings(now)
+    times = Counter(reading.signal for reading in readings)
+    signals = ", ".join(
+        f"{f'{reading.message}.' if times[reading.signal] > 1 else ''}{reading.signal} "
+        f"{reading.text}{' (stale)' if reading.stale else ''}"
+        for reading in readings
+    )
+    leaves = ", ".join(active[:_LEAF_NAMES_IN_A_LINE]) + more
+    return (
+        f"tick {view.tick} {status_name(view.root_status)} [{leaves}] {signals}; {_pace(watch, now)}; {_losses(view)}"
+    )
+
+
+def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> RenderableType:
+    """The controller as a picture for a terminal: tree, signals, one line on its health."""
+    silent = watch.silent_for(now) is not None
+    table = Table.grid(padding=(0, 1), expand=True)
+    table.add_column(ratio=3)
+    table.add_column(ratio=2)
+    table.add_row(
+        Panel(_tree(watch, silent, ascii_only), title=Text(watch.model.tree_id), title_align="left"),
+        Panel(_signals(watch, now), title="signals", title_align="left"),
+    )
+    return Group(Text(title, style="bold"), table, _footer(watch, now))
+
+
+def _tree(watch: Watch, silent: bool, ascii_only: bool) -> Tree:
+    view = watch.view
+    statuses = view.statuses if view else (int(Status.UNKNOWN),) * len(watch.model.nodes)
+    branches: list[Tree] = []
+    for node in watch.model.nodes:
+        label = _label(node, statuses[node.index], silent, ascii_only)
+        branches.append(Tree(label) if node.parent is None else branches[node.parent].add(label))
+    return branches[0]
+
+
+def _label(node: Node, code: int, silent: bool, ascii_only: bool) -> Text:
+    before = code > Status.PREVIOUSLY
+    shown = Status(code - Status.PREVIOUSLY) if before else Status(code)
+    style = _STYLES[Status.UNKNOWN] if silent else _STYLES[shown].replace("bold", "dim" if before else "bold")
+    if node.category == "control":
+        head = f"{symbol(node, ascii_only)}  {node.name}"
+    elif node.category == "condition":
+        head = f"({node.name})"
+    elif node.category == "action":
+        head = f"[{node.name}]"
+    else:
+        head = f"<{node.type}> {node.name}"
+    return Text.assemble((head, style), "  ", (f"was {shown.name}" if before else shown.name, style))
+
+
+def _signals(watch: Watch, now: float) -> Table:
+    table = Table.grid(padding=(0, 1))
+    message = ""
+    for reading in watch.signals.readings(now):
+        if reading.message != message:
+            message = reading.message
+            direction = "sends" if reading.sent else "receives"
+            table.add_row(Text(message, style="bold"), Text(direction, style="bright_black"))
+        style = "red" if reading.stale else "bright_black" if reading.value is None else "cyan"
+        table.add_row(
+            Text(f"  {reading.signal}"), Text(reading.text + (" (stale)" if reading.stale else ""), style=style)
+        )
+    return table
+
+
+def _footer(watch: Watch, now: float) -> Text:
+    view = watch.view
+    if view is None:
+        return Text("no trace yet", style="bold red")
+    lossless = not (view.lost or view.refused)
+    return Text.assemble(
+        (f"tick {view.tick}  ", "bold"),
+        (f"{status_name(view.root_status)}  ", _STYLES[Status(view.root_status)]),
+        (_pace(watch, now), "bold red" if watch.silent_for(now) is not None else ""),
+        "; ",
+        (_losses(view), "" if lossless else "red"),
+    )
+
+
+def _pace(watch: Watch, now: float) -> str:
+    silent = watch.silent_for(now)
+    return f"SILENT for {silent:.1f} s" if silent is not None else f"{watch.rate(now):.1f} ticks/s"
+
+
+def _losses(view: TreeView) -> str:
+    text = f"{view.overruns} overruns, {view.lost} trace frames lost"
+    if view.refused:
+        text += f", {view.refused} refused"
+    if view.restarts:
+        text += f", {view.restarts} restarts"
+    if view.health is not None:
+        health = view.health
+        text += f"; controller: {health.rx_rejected} refused, {health.tx_dropped} not sent, {health.faults} faults"
+    return text
+
+
+class Display(Protocol):
+    """Somewhere the watched controller is shown. A context: what it needs is set up and put back."""
+
+    def __enter__(self) -> Display: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def show(self, watch: Watch, now: float, new_tick: bool, title: str = "") -> None:
+        """Call this often; it shows what is due at the time `now` [s]."""
+
+
+class LineDisplay:
+    """Lines of text, or of JSON, every `period` seconds; 0: one for each tick."""
+
+    def __init__(self, period: float, as_json: bool) -> None:
+        self._period = period
+        self._as_json = as_json
+        self._due: float | None = None
+
+    def __enter__(self) -> LineDisplay:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def show(self, watch: Watch, now: float, new_tick: bool, title: str = "") -> None:
+        """Prints a line when one is due. The title is for pictures."""
+        if self._period > 0:
+            self._due = now + self._period if self._due is None else self._due
+            if now < self._due:
+                return
+            self._due = now + self._period
+        elif not new_tick:
+            return
+        # click.echo flushes, and writes no colours.
+        click.echo(json.dumps(watch.snapshot(now)) if self._as_json else line(watch, now))
+
+
+class LiveDisplay:
+    """A picture that is redrawn in place, for a terminal."""
+
+    def __init__(self) -> None:
+        self._console = Console()
+        self._ascii_only = self._console.options.ascii_only
+        self._live = Live(console=self._console, auto_refresh=False, vertical_overflow="ellipsis")
+        self._due = 0.0
+
+    def __enter__(self) -> LiveDisplay:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def show(self, watch: Watch, now: float, new_tick: bool, title: str = "") -> None:
+        """Redraws, at most ten times a second."""
+        if now >= self._due:
+            self._due = now + _REDRAW_S
+            self._live.update(picture(watch, now, title, self._ascii_only), refresh=True)
+
+
+def make_display(as_json: bool, period: float) -> Display:
+    """A picture where stdout is a terminal, else lines every `period` seconds (0: one for each tick)."""
+    if as_json or not sys.stdout.isatty():
+        return LineDisplay(period, as_json)
+    return LiveDisplay()
