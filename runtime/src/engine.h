@@ -57,16 +57,34 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
     return all_skipped;
 }
 
-/** The node's parameter, as written in the XML. */
-static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node)
+/** A parameter of the node, as written in the XML; `which` counts in the order of nodes.def. */
+static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node, unsigned which)
 {
-    return self->tree->parameters[self->tree->nodes[node].parameter];
+    return self->tree->parameters[self->tree->nodes[node].parameter + which];
 }
 
 /** The node's state words. */
 static inline uint16_t *canopy_words(canopy_tree_instance_t *self, uint16_t node)
 {
     return &self->words[self->tree->nodes[node].state];
+}
+
+/** How many children; O(children). */
+static inline uint16_t canopy_count_children(const canopy_tree_instance_t *self, uint16_t node)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t children = 0;
+
+    for (uint16_t child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
+        children++;
+    }
+    return children;
+}
+
+/** A threshold over `children`: a negative one counts from children + 1 down (-1: all). */
+static inline int32_t canopy_threshold(int32_t written, int32_t children)
+{
+    return written < 0 ? written + children + 1 : written;
 }
 
 #endif

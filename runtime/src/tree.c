@@ -5,13 +5,33 @@
 #include <stddef.h>
 
 #include "engine.h"
-#include "nodes/inverter.h"
+#include "nodes/async_sequence.h"
+#include "nodes/delay.h"
+#include "nodes/if_then_else.h"
 #include "nodes/leaf.h"
+#include "nodes/parallel.h"
+#include "nodes/parallel_all.h"
 #include "nodes/reactive.h"
 #include "nodes/reactive_parallel.h"
-#include "nodes/retry_until_successful.h"
+#include "nodes/repeat.h"
+#include "nodes/result.h"
+#include "nodes/run_once.h"
 #include "nodes/sequence.h"
+#include "nodes/sequence_with_memory.h"
 #include "nodes/timeout.h"
+#include "nodes/try_catch.h"
+#include "nodes/while_do_else.h"
+
+/** Every node IDLE, every state word 0. */
+static void forget_everything(canopy_tree_instance_t *self)
+{
+    for (uint16_t node = 0; node < self->tree->node_count; node++) {
+        self->status[node] = (uint8_t)CANOPY_IDLE;
+    }
+    for (uint16_t word = 0; word < self->tree->word_count; word++) {
+        self->words[word] = 0;
+    }
+}
 
 canopy_error_t canopy_tree_init(canopy_tree_instance_t *self, const canopy_tree_t *tree, uint8_t *status,
                                 uint16_t *words, void *application)
@@ -22,12 +42,7 @@ canopy_error_t canopy_tree_init(canopy_tree_instance_t *self, const canopy_tree_
     }
     *self = (canopy_tree_instance_t){
         .tree = tree, .application = application, .status = status, .words = words, .fault_node = UINT16_MAX};
-    for (uint16_t node = 0; node < tree->node_count; node++) {
-        status[node] = (uint8_t)CANOPY_IDLE;
-    }
-    for (uint16_t word = 0; word < tree->word_count; word++) {
-        words[word] = 0;
-    }
+    forget_everything(self);
     return CANOPY_OK;
 }
 
@@ -49,20 +64,50 @@ static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
         return canopy_leaf_enter(self, node);
     case CANOPY_NODE_STATEFUL_ACTION:
         return canopy_stateful_action_enter(self, node);
+    case CANOPY_NODE_ALWAYS_SUCCESS:
+        return canopy_done(CANOPY_SUCCESS);
+    case CANOPY_NODE_ALWAYS_FAILURE:
+        return canopy_done(CANOPY_FAILURE);
+    case CANOPY_NODE_SLEEP:
+        return canopy_sleep_enter(self, node);
     case CANOPY_NODE_SEQUENCE:
     case CANOPY_NODE_FALLBACK:
         return canopy_sequence_enter(self, node);
+    case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
+        return canopy_sequence_with_memory_enter(self, node);
+    case CANOPY_NODE_ASYNC_SEQUENCE:
+    case CANOPY_NODE_ASYNC_FALLBACK:
+        return canopy_async_sequence_enter(self, node);
     case CANOPY_NODE_REACTIVE_SEQUENCE:
     case CANOPY_NODE_REACTIVE_FALLBACK:
         return canopy_reactive_enter(node);
+    case CANOPY_NODE_PARALLEL:
+        return canopy_parallel_enter(self, node);
+    case CANOPY_NODE_PARALLEL_ALL:
+        return canopy_parallel_all_enter(self, node);
     case CANOPY_NODE_REACTIVE_PARALLEL:
         return canopy_reactive_parallel_enter(node);
+    case CANOPY_NODE_IF_THEN_ELSE:
+        return canopy_if_then_else_enter(self, node);
+    case CANOPY_NODE_WHILE_DO_ELSE:
+        return canopy_while_do_else_enter(node);
+    case CANOPY_NODE_TRY_CATCH:
+        return canopy_try_catch_enter(self, node);
     case CANOPY_NODE_INVERTER:
-        return canopy_inverter_enter(node);
+    case CANOPY_NODE_FORCE_SUCCESS:
+    case CANOPY_NODE_FORCE_FAILURE:
+    case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
+        return canopy_result_enter(node);
+    case CANOPY_NODE_REPEAT:
+        return canopy_repeat_enter(self, node, CANOPY_SUCCESS);
     case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
-        return canopy_retry_enter(self, node);
+        return canopy_repeat_enter(self, node, CANOPY_FAILURE);
+    case CANOPY_NODE_DELAY:
+        return canopy_delay_enter(self, node);
     case CANOPY_NODE_TIMEOUT:
         return canopy_timeout_enter(self, node);
+    case CANOPY_NODE_RUN_ONCE:
+        return canopy_run_once_enter(self, node);
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -78,21 +123,52 @@ static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t no
         return canopy_sequence_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_FALLBACK:
         return canopy_sequence_child(self, node, child, status, CANOPY_FAILURE);
+    case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
+        return canopy_sequence_with_memory_child(self, node, child, status);
+    case CANOPY_NODE_ASYNC_SEQUENCE:
+        return canopy_async_sequence_child(self, node, child, status, CANOPY_SUCCESS);
+    case CANOPY_NODE_ASYNC_FALLBACK:
+        return canopy_async_sequence_child(self, node, child, status, CANOPY_FAILURE);
     case CANOPY_NODE_REACTIVE_SEQUENCE:
         return canopy_reactive_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_REACTIVE_FALLBACK:
         return canopy_reactive_child(self, node, child, status, CANOPY_FAILURE);
+    case CANOPY_NODE_PARALLEL:
+        return canopy_parallel_child(self, node, child, status);
+    case CANOPY_NODE_PARALLEL_ALL:
+        return canopy_parallel_all_child(self, node, child);
     case CANOPY_NODE_REACTIVE_PARALLEL:
         return canopy_reactive_parallel_child(self, node, child);
+    case CANOPY_NODE_IF_THEN_ELSE:
+        return canopy_if_then_else_child(self, node, child, status);
+    case CANOPY_NODE_WHILE_DO_ELSE:
+        return canopy_while_do_else_child(self, node, child, status);
+    case CANOPY_NODE_TRY_CATCH:
+        return canopy_try_catch_child(self, node, child, status);
     case CANOPY_NODE_INVERTER:
-        return canopy_inverter_child(self, child, status);
+        return canopy_result_child(self, child, status, CANOPY_FAILURE, CANOPY_SUCCESS);
+    case CANOPY_NODE_FORCE_SUCCESS:
+        return canopy_result_child(self, child, status, CANOPY_SUCCESS, CANOPY_SUCCESS);
+    case CANOPY_NODE_FORCE_FAILURE:
+        return canopy_result_child(self, child, status, CANOPY_FAILURE, CANOPY_FAILURE);
+    case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
+        return canopy_result_child(self, child, status, CANOPY_RUNNING, CANOPY_FAILURE);
+    case CANOPY_NODE_REPEAT:
+        return canopy_repeat_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
-        return canopy_retry_child(self, node, child, status);
+        return canopy_repeat_child(self, node, child, status, CANOPY_FAILURE);
+    case CANOPY_NODE_DELAY:
+        return canopy_delay_child(self, node, child, status);
     case CANOPY_NODE_TIMEOUT:
         return canopy_timeout_child(self, child, status);
+    case CANOPY_NODE_RUN_ONCE:
+        return canopy_run_once_child(self, node, child, status);
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
     case CANOPY_NODE_STATEFUL_ACTION:
+    case CANOPY_NODE_ALWAYS_SUCCESS:
+    case CANOPY_NODE_ALWAYS_FAILURE:
+    case CANOPY_NODE_SLEEP:
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -106,18 +182,37 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_STATEFUL_ACTION:
         canopy_stateful_action_halt(self, node);
         break;
+    case CANOPY_NODE_REPEAT:
     case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
-        canopy_retry_halt(self, node);
+        canopy_repeat_halt(self, node);
+        break;
+    case CANOPY_NODE_DELAY:
+        canopy_delay_halt(self, node);
         break;
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
+    case CANOPY_NODE_ALWAYS_SUCCESS:
+    case CANOPY_NODE_ALWAYS_FAILURE:
+    case CANOPY_NODE_SLEEP:
     case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
+    case CANOPY_NODE_ASYNC_SEQUENCE:
     case CANOPY_NODE_REACTIVE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_ASYNC_FALLBACK:
     case CANOPY_NODE_REACTIVE_FALLBACK:
+    case CANOPY_NODE_PARALLEL:
+    case CANOPY_NODE_PARALLEL_ALL:
     case CANOPY_NODE_REACTIVE_PARALLEL:
+    case CANOPY_NODE_IF_THEN_ELSE:
+    case CANOPY_NODE_WHILE_DO_ELSE:
+    case CANOPY_NODE_TRY_CATCH:
     case CANOPY_NODE_INVERTER:
+    case CANOPY_NODE_FORCE_SUCCESS:
+    case CANOPY_NODE_FORCE_FAILURE:
+    case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
     case CANOPY_NODE_TIMEOUT:
+    case CANOPY_NODE_RUN_ONCE:
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -182,4 +277,10 @@ void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top)
 void canopy_tree_halt(canopy_tree_instance_t *self)
 {
     canopy_reset_child(self, 0);
+}
+
+void canopy_tree_reset(canopy_tree_instance_t *self)
+{
+    canopy_tree_halt(self);
+    forget_everything(self);
 }

@@ -8,32 +8,43 @@ typedef struct {
     uint16_t least;
     uint16_t most;
     uint8_t words;
-    bool leaf;
-    bool parameter;
+    uint8_t parameters;
 } canopy_shape_t;
 
-enum { CONTROL = 0, DECORATOR = 0, LEAF = 1 };
-
 static const canopy_shape_t shapes[CANOPY_NODE_TYPES] = {
-#define CANOPY_NODE(id, name, category, least, most, words, parameter, text) \
-    [CANOPY_NODE_##id] = {(least), (most), (words), (category) != 0, sizeof(parameter) > 1u},
+#define CANOPY_NODE(id, name, category, least, most, words, count, parameters, text) \
+    [CANOPY_NODE_##id] = {(least), (most), (words), (count)},
 #include "canopy/nodes.def"
 #undef CANOPY_NODE
 };
 
-/** The node's own fields, its parameter and its state words. */
-static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, const canopy_shape_t *shape)
+/** A leaf of the user's has all the functions that its kind needs. */
+static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
 {
-    if (shape->words != 0u && (uint32_t)node->state + shape->words > tree->word_count) {
+    const canopy_leaf_t *leaf;
+
+    if (node->leaf >= tree->leaf_count) {
         return false;
     }
-    if (shape->leaf) {
-        const canopy_leaf_t *leaf = node->leaf < tree->leaf_count ? &tree->leaves[node->leaf] : NULL;
-
-        return leaf != NULL && leaf->tick != NULL &&
-               (node->type != (uint8_t)CANOPY_NODE_STATEFUL_ACTION || (leaf->running != NULL && leaf->halted != NULL));
+    leaf = &tree->leaves[node->leaf];
+    if (node->type == (uint8_t)CANOPY_NODE_STATEFUL_ACTION) {
+        return leaf->tick != NULL && leaf->running != NULL && leaf->halted != NULL;
     }
-    return !shape->parameter || node->parameter < tree->parameter_count;
+    return leaf->tick != NULL;
+}
+
+static bool calls_the_application(const canopy_node_t *node)
+{
+    return node->type == (uint8_t)CANOPY_NODE_CONDITION || node->type == (uint8_t)CANOPY_NODE_SYNC_ACTION ||
+           node->type == (uint8_t)CANOPY_NODE_STATEFUL_ACTION;
+}
+
+/** The node's own fields: its state words, its parameters, its functions. */
+static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, const canopy_shape_t *shape)
+{
+    return (shape->words == 0u || (uint32_t)node->state + shape->words <= tree->word_count) &&
+           (shape->parameters == 0u || (uint32_t)node->parameter + shape->parameters <= tree->parameter_count) &&
+           (!calls_the_application(node) || functions_fit(tree, node));
 }
 
 /** The children: each lies within the node, names it as parent, and their number suits the type. */

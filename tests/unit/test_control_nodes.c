@@ -127,6 +127,146 @@ static void reactive_parallel_minus_one_means_all(void)
     EXPECT("SSK", CANOPY_SUCCESS, "abc");
 }
 
+static void sequence_with_memory_goes_on_where_it_failed_or_was_halted(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE_WITH_MEMORY);
+    EXPECT("SFS", CANOPY_FAILURE, "ab");
+    EXPECT("SFS", CANOPY_FAILURE, "b");
+    EXPECT("SRS", CANOPY_RUNNING, "b");
+    bench.script.log[0] = '\0';
+    canopy_tree_halt(&bench.instance);
+    TEST_ASSERT_EQUAL_STRING("b!", bench.script.log);
+    EXPECT("SSS", CANOPY_SUCCESS, "bc");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    canopy_tree_reset(&bench.instance);
+    EXPECT("SSS", CANOPY_SUCCESS, "abc");
+}
+
+static void async_sequence_ends_the_tick_after_a_child_that_completed_at_once(void)
+{
+    start_three_actions(CANOPY_NODE_ASYNC_SEQUENCE);
+    EXPECT("SRS", CANOPY_RUNNING, "a");
+    EXPECT("SRS", CANOPY_RUNNING, "b");
+    EXPECT("SSR", CANOPY_RUNNING, "b'c");
+    EXPECT("SSS", CANOPY_SUCCESS, "c'");
+    EXPECT("KSS", CANOPY_RUNNING, "ab");
+    EXPECT("KSS", CANOPY_SUCCESS, "c");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    EXPECT("FSS", CANOPY_FAILURE, "a");
+}
+
+static void async_fallback_is_its_mirror_image(void)
+{
+    start_three_actions(CANOPY_NODE_ASYNC_FALLBACK);
+    EXPECT("FRS", CANOPY_RUNNING, "a");
+    EXPECT("FRS", CANOPY_RUNNING, "b");
+    EXPECT("FFF", CANOPY_FAILURE, "b'c");
+    EXPECT("SFF", CANOPY_SUCCESS, "a");
+}
+
+static void start_thresholds(canopy_node_type_t type, const int32_t *parameters)
+{
+    static canopy_node_t nodes[] = {INNER(PARALLEL, 0, 4, 0, 0), ACTION(0, 1, 0), ACTION(0, 2, 1), ACTION(0, 3, 2)};
+
+    nodes[0].type = (uint8_t)type;
+    bench_start(&bench, nodes, 4, parameters, 2);
+}
+
+static void parallel_remembers_what_has_completed(void)
+{
+    static const int32_t two_and_two[] = {2, 2};
+
+    start_thresholds(CANOPY_NODE_PARALLEL, two_and_two);
+    EXPECT("RSR", CANOPY_RUNNING, "abc");
+    EXPECT("RRF", CANOPY_RUNNING, "a'c'");
+    EXPECT("SRR", CANOPY_SUCCESS, "a'");
+    EXPECT("FFR", CANOPY_FAILURE, "ab");
+    EXPECT("FRK", CANOPY_RUNNING, "abc");
+    EXPECT("RSS", CANOPY_SUCCESS, "b'c");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    EXPECT("RRR", CANOPY_RUNNING, "abc");
+    EXPECT("SSR", CANOPY_SUCCESS, "a'b'c!");
+}
+
+static void parallel_with_a_negative_threshold_counts_skipped_as_success(void)
+{
+    static const int32_t all_and_one[] = {-1, 1};
+
+    start_thresholds(CANOPY_NODE_PARALLEL, all_and_one);
+    EXPECT("SKS", CANOPY_SUCCESS, "abc");
+    EXPECT("SKR", CANOPY_RUNNING, "abc");
+    EXPECT("RKS", CANOPY_SUCCESS, "bc'");
+    EXPECT("RFR", CANOPY_FAILURE, "aba!");
+}
+
+static void parallel_all_waits_for_every_child(void)
+{
+    static const int32_t one[] = {1, 0};
+    static const int32_t two[] = {2, 0};
+
+    start_thresholds(CANOPY_NODE_PARALLEL_ALL, one);
+    EXPECT("FRS", CANOPY_RUNNING, "abc");
+    EXPECT("SRR", CANOPY_RUNNING, "b'");
+    EXPECT("SSR", CANOPY_FAILURE, "b'");
+    EXPECT("KKK", CANOPY_SKIPPED, "abc");
+    EXPECT("SKS", CANOPY_SUCCESS, "abc");
+    start_thresholds(CANOPY_NODE_PARALLEL_ALL, two);
+    EXPECT("FSS", CANOPY_SUCCESS, "abc");
+    EXPECT("FSF", CANOPY_FAILURE, "abc");
+}
+
+static void if_then_else_asks_once(void)
+{
+    start_three_actions(CANOPY_NODE_IF_THEN_ELSE);
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("FRS", CANOPY_RUNNING, "b'");
+    EXPECT("FSS", CANOPY_SUCCESS, "b'");
+    EXPECT("FSR", CANOPY_RUNNING, "ac");
+    EXPECT("SSF", CANOPY_FAILURE, "c'");
+    EXPECT("RSS", CANOPY_RUNNING, "a");
+    EXPECT("SKS", CANOPY_SKIPPED, "a'b");
+    EXPECT("KSS", CANOPY_SKIPPED, "a");
+}
+
+static void while_do_else_asks_every_tick_and_halts_the_other_branch(void)
+{
+    start_three_actions(CANOPY_NODE_WHILE_DO_ELSE);
+    EXPECT("SRR", CANOPY_RUNNING, "ab");
+    EXPECT("SRR", CANOPY_RUNNING, "ab'");
+    EXPECT("FRR", CANOPY_RUNNING, "ab!c");
+    EXPECT("RRR", CANOPY_RUNNING, "a");
+    EXPECT("SSR", CANOPY_SUCCESS, "a'c!b");
+    EXPECT("SRR", CANOPY_RUNNING, "ab");
+    EXPECT("KRR", CANOPY_SKIPPED, "ab!");
+}
+
+static void the_else_branch_may_be_missing(void)
+{
+    static canopy_node_t nodes[] = {INNER(WHILE_DO_ELSE, 0, 3, 0, 0), ACTION(0, 1, 0), ACTION(0, 2, 1)};
+
+    nodes[0].type = CANOPY_NODE_WHILE_DO_ELSE;
+    START(nodes, none);
+    EXPECT("SR", CANOPY_RUNNING, "ab");
+    EXPECT("FR", CANOPY_FAILURE, "ab!");
+    nodes[0].type = CANOPY_NODE_IF_THEN_ELSE;
+    START(nodes, none);
+    EXPECT("FR", CANOPY_FAILURE, "a");
+    EXPECT("SR", CANOPY_RUNNING, "ab");
+}
+
+static void try_catch_fails_after_its_handler(void)
+{
+    start_three_actions(CANOPY_NODE_TRY_CATCH);
+    EXPECT("SSS", CANOPY_SUCCESS, "ab");
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("SFR", CANOPY_RUNNING, "b'c");
+    EXPECT("SSS", CANOPY_FAILURE, "c'");
+    EXPECT("FSF", CANOPY_FAILURE, "ac");
+    EXPECT("KSS", CANOPY_SUCCESS, "ab");
+    EXPECT("KKS", CANOPY_SKIPPED, "ab");
+}
+
 static void a_halt_goes_deepest_first_and_once(void)
 {
     /* ReactiveFallback(a, Sequence(b, Parallel(c, Inverter(d), e))): a aborts everything below the sequence. */
@@ -190,6 +330,16 @@ int main(void)
     RUN_TEST(a_halted_child_is_started_anew);
     RUN_TEST(reactive_parallel_counts_all_children_every_tick);
     RUN_TEST(reactive_parallel_minus_one_means_all);
+    RUN_TEST(sequence_with_memory_goes_on_where_it_failed_or_was_halted);
+    RUN_TEST(async_sequence_ends_the_tick_after_a_child_that_completed_at_once);
+    RUN_TEST(async_fallback_is_its_mirror_image);
+    RUN_TEST(parallel_remembers_what_has_completed);
+    RUN_TEST(parallel_with_a_negative_threshold_counts_skipped_as_success);
+    RUN_TEST(parallel_all_waits_for_every_child);
+    RUN_TEST(if_then_else_asks_once);
+    RUN_TEST(while_do_else_asks_every_tick_and_halts_the_other_branch);
+    RUN_TEST(the_else_branch_may_be_missing);
+    RUN_TEST(try_catch_fails_after_its_handler);
     RUN_TEST(a_halt_goes_deepest_first_and_once);
     RUN_TEST(halting_the_tree_follows_the_same_rule);
     RUN_TEST(statuses_are_kept_for_monitors);

@@ -121,6 +121,95 @@ static void timeout_works_while_time_stands_still(void)
     EXPECT_AT(7, "R", CANOPY_FAILURE, "a!");
 }
 
+static void repeat_makes_one_cycle_a_tick(void)
+{
+    start_decorator(CANOPY_NODE_REPEAT, &three);
+    EXPECT("S", CANOPY_RUNNING, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_RUNNING, "a'");
+    EXPECT("K", CANOPY_SKIPPED, "a");
+    EXPECT("S", CANOPY_SUCCESS, "a");
+    EXPECT("S", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_FAILURE, "a");
+    EXPECT("S", CANOPY_RUNNING, "a");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("S", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_RUNNING, "a");
+    EXPECT("S", CANOPY_SUCCESS, "a");
+    start_decorator(CANOPY_NODE_REPEAT, &zero);
+    EXPECT("F", CANOPY_SUCCESS, "");
+}
+
+static void forced_results(void)
+{
+    start_decorator(CANOPY_NODE_FORCE_SUCCESS, &zero);
+    EXPECT("F", CANOPY_SUCCESS, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("K", CANOPY_SKIPPED, "a'");
+    start_decorator(CANOPY_NODE_FORCE_FAILURE, &zero);
+    EXPECT("S", CANOPY_FAILURE, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("F", CANOPY_FAILURE, "a'");
+    start_decorator(CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE, &zero);
+    EXPECT("S", CANOPY_RUNNING, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    EXPECT("K", CANOPY_SKIPPED, "a'");
+    EXPECT("F", CANOPY_FAILURE, "a");
+}
+
+static void delay_waits_once_before_each_completion(void)
+{
+    start_decorator(CANOPY_NODE_DELAY, &three);
+    EXPECT_AT(0, "R", CANOPY_RUNNING, "");
+    EXPECT_AT(2999, "R", CANOPY_RUNNING, "");
+    EXPECT_AT(3000, "R", CANOPY_RUNNING, "a");
+    EXPECT_AT(3001, "K", CANOPY_SKIPPED, "a'");
+    EXPECT_AT(3002, "S", CANOPY_SUCCESS, "a");
+    EXPECT_AT(3003, "S", CANOPY_RUNNING, "");
+    canopy_tree_halt(&bench.instance);
+    EXPECT_AT(4000, "S", CANOPY_RUNNING, "");
+    EXPECT_AT(6500, "S", CANOPY_RUNNING, "");
+    EXPECT_AT(7000, "S", CANOPY_SUCCESS, "a");
+}
+
+static void run_once_remembers_until_the_tree_is_reset(void)
+{
+    static const int32_t yes = 1;
+
+    start_decorator(CANOPY_NODE_RUN_ONCE, &yes);
+    EXPECT("K", CANOPY_SKIPPED, "a");
+    EXPECT("R", CANOPY_RUNNING, "a");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("F", CANOPY_FAILURE, "a");
+    EXPECT("S", CANOPY_SKIPPED, "");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("S", CANOPY_SKIPPED, "");
+    canopy_tree_reset(&bench.instance);
+    EXPECT("S", CANOPY_SUCCESS, "a");
+    start_decorator(CANOPY_NODE_RUN_ONCE, &zero);
+    EXPECT("F", CANOPY_FAILURE, "a");
+    EXPECT("S", CANOPY_FAILURE, "");
+}
+
+static void built_in_leaves(void)
+{
+    static canopy_node_t nodes[] = {INNER(ALWAYS_SUCCESS, 0, 1, 0, 0)};
+
+    nodes[0].type = CANOPY_NODE_ALWAYS_SUCCESS;
+    bench_start(&bench, nodes, 1, &three, 1);
+    EXPECT("", CANOPY_SUCCESS, "");
+    nodes[0].type = CANOPY_NODE_ALWAYS_FAILURE;
+    EXPECT("", CANOPY_FAILURE, "");
+    nodes[0].type = CANOPY_NODE_SLEEP;
+    bench_start(&bench, nodes, 1, &three, 1);
+    EXPECT_AT(10, "", CANOPY_RUNNING, "");
+    EXPECT_AT(3009, "", CANOPY_RUNNING, "");
+    EXPECT_AT(3010, "", CANOPY_SUCCESS, "");
+    EXPECT_AT(3011, "", CANOPY_RUNNING, "");
+    canopy_tree_halt(&bench.instance);
+    EXPECT_AT(6010, "", CANOPY_RUNNING, "");
+}
+
 static void a_wrong_status_of_a_leaf_is_a_failure_and_counted(void)
 {
     static const canopy_node_t nodes[] = {INNER(FALLBACK, 0, 4, 0, 0), CONDITION(0, 1, 0), SYNC(0, 2, 1),
@@ -202,6 +291,11 @@ int main(void)
     RUN_TEST(timeout_stops_its_clock_when_the_child_is_skipped);
     RUN_TEST(timeout_is_right_across_the_wrap_of_time);
     RUN_TEST(timeout_works_while_time_stands_still);
+    RUN_TEST(repeat_makes_one_cycle_a_tick);
+    RUN_TEST(forced_results);
+    RUN_TEST(delay_waits_once_before_each_completion);
+    RUN_TEST(run_once_remembers_until_the_tree_is_reset);
+    RUN_TEST(built_in_leaves);
     RUN_TEST(a_wrong_status_of_a_leaf_is_a_failure_and_counted);
     RUN_TEST(init_refuses_what_it_cannot_use);
     RUN_TEST(the_validator_refuses_tables_that_a_tick_could_leave);

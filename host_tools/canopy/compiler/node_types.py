@@ -15,13 +15,21 @@ ANY_NUMBER = 0xFFFF
 
 _ROW = re.compile(
     r'^CANOPY_NODE\((?P<enum>\w+), "(?P<name>\w+)", (?P<category>\w+), (?P<least>\w+), (?P<most>\w+), (?P<words>\d+), '
-    r'"(?P<parameter>[^"]*)", "(?P<text>[^"]*)"\)$'
+    r'(?P<count>\d+), "(?P<parameters>[^"]*)", "(?P<text>[^"]*)"\)$'
 )
 
 
 @dataclass(frozen=True)
+class Parameter:
+    """An XML attribute that becomes a 32-bit parameter; `default` is "" when it must be given."""
+
+    name: str
+    default: str
+
+
+@dataclass(frozen=True)
 class NodeType:
-    """One row of nodes.def. `parameter` is an XML attribute, or "" for none."""
+    """One row of nodes.def."""
 
     number: int
     enum: str
@@ -30,7 +38,7 @@ class NodeType:
     least_children: int
     most_children: int
     words: int
-    parameter: str
+    parameters: tuple[Parameter, ...]
     text: str
 
     def arity_text(self) -> str:
@@ -55,6 +63,9 @@ def node_types() -> dict[str, NodeType]:
         category = row["category"]
         if category not in ("LEAF", "CONTROL", "DECORATOR"):
             raise RuntimeError(f"nodes.def: unknown category {category}")
+        parameters = tuple(Parameter(*part.partition("=")[::2]) for part in row["parameters"].split())
+        if len(parameters) != int(row["count"]):
+            raise RuntimeError(f"nodes.def: {row['name']} says {row['count']} parameters")
         table[row["name"]] = NodeType(
             number=len(table),
             enum=f"CANOPY_NODE_{row['enum']}",
@@ -63,7 +74,7 @@ def node_types() -> dict[str, NodeType]:
             least_children=int(row["least"], 0),
             most_children=int(row["most"], 0),
             words=int(row["words"]),
-            parameter=row["parameter"],
+            parameters=parameters,
             text=row["text"],
         )
     return table

@@ -75,7 +75,8 @@ def _ends(root: Node) -> list[tuple[Node, int, int, int]]:
 def make_table(tree: Tree) -> Table:
     """Lays the tree out."""
     rows: list[Row] = []
-    parameters: dict[int, int] = {}
+    parameters: list[int] = []
+    places: dict[tuple[int, ...], int] = {}  # equal parameters are stored once
     uses: dict[str, LeafUse] = {}
     words = 0
     for node, parent, end, depth in _ends(tree.root):
@@ -84,8 +85,10 @@ def make_table(tree: Tree) -> Table:
             use = uses.setdefault(node.leaf.id, LeafUse(node.leaf, len(uses), []))
             leaf, parameter = use.index, len(use.nodes)
             use.nodes.append(node)
-        elif node.parameter is not None:
-            parameter = parameters.setdefault(node.parameter, len(parameters))
+        elif node.parameters:
+            parameter = places.setdefault(node.parameters, len(parameters))
+            if parameter == len(parameters):
+                parameters.extend(node.parameters)
         if node.type.words:
             state, words = words, words + node.type.words
         rows.append(Row(node, parent, end, state, leaf, parameter, depth))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.leaf_model import Leaf, read_leaves
-from canopy.compiler.node_types import NodeType, node_types
+from canopy.compiler.node_types import NodeType, Parameter, node_types
 from canopy.compiler.xml_reader import Element, read_xml
 
 MAX_NODES = 65_534
@@ -16,12 +16,14 @@ MAX_NODES = 65_534
 # Attributes that any node may have and that change nothing in a tick.
 PLAIN_ATTRIBUTES = ("name", "_uid", "_description")
 
+# Kinds of the user's own leaves: their names in XML are those of the leaves.
+USER_KINDS = ("Condition", "SyncAction", "StatefulAction")
+
 # Of BehaviorTree.CPP 4, and known to be missing here: refused by name, not as a typing error.
 NOT_SUPPORTED = frozenset(
-    "SubTree Parallel ParallelAll SequenceWithMemory AsyncSequence AsyncFallback IfThenElse WhileDoElse Switch2 Switch3 "
-    "Switch4 Switch5 Switch6 TryCatch ForceSuccess ForceFailure Repeat KeepRunningUntilFailure Delay RunOnce LoopInt "
-    "LoopBool LoopDouble LoopString Precondition SkipUnlessUpdated WaitValueUpdate WasEntryUpdated AlwaysSuccess "
-    "AlwaysFailure Sleep Script ScriptCondition SetBlackboard UnsetBlackboard TestNode ManualSelector".split()
+    "SubTree Switch2 Switch3 Switch4 Switch5 Switch6 LoopInt LoopBool LoopDouble LoopString Precondition "
+    "SkipUnlessUpdated WaitValueUpdate WasEntryUpdated Script ScriptCondition SetBlackboard UnsetBlackboard TestNode "
+    "ManualSelector".split()
 )
 CONDITION_ATTRIBUTES = frozenset(
     "_failureIf _successIf _skipIf _while _onSuccess _onFailure _onHalted _post _autoremap".split()
@@ -35,7 +37,7 @@ class Node:
     type: NodeType
     name: str
     place: Place
-    parameter: int | None = None
+    parameters: tuple[int, ...] = ()
     leaf: Leaf | None = None
     port_values: tuple[str, ...] = ()
     children: list[Node] = field(default_factory=list)
@@ -51,20 +53,37 @@ class Tree:
     leaves: dict[str, Leaf]
 
 
-def _parameter(element: Element, kind: NodeType) -> int | None:
-    if not kind.parameter:
-        return None
-    name, _, default = kind.parameter.partition("=")
-    text = element.attributes.get(name, default)
+# Least value of a parameter; the others may be any 32-bit number.
+LEAST = {"num_attempts": -1, "num_cycles": -1, "msec": 0, "delay_msec": 0, "then_skip": 0}
+# Parameters that are a number of children: 1 to N, or -1 (all) down to -N.
+THRESHOLDS = ("success_count", "failure_count", "max_failures")
+
+
+def _parameter(element: Element, parameter: Parameter) -> int:
+    name = parameter.name
+    text = element.attributes.get(name, parameter.default)
     if not text:
         raise CompileError(element.place, f"<{element.tag}> needs the attribute {name}", f'for example {name}="3"')
+    if text.startswith("{"):
+        raise CompileError(
+            element.place, f"{name}: blackboard entries ({text}) are not supported", "give a literal value"
+        )
+    if text in ("true", "false"):
+        text = "1" if text == "true" else "0"
     try:
         value = int(text)
     except ValueError:
         raise CompileError(element.place, f"{name}='{text}' is not a whole number") from None
-    least = {"num_attempts": -1, "msec": 0}.get(name, -(2**31))
+    least = LEAST.get(name, -(2**31))
     if not least <= value < 2**31:
         raise CompileError(element.place, f"{name}={value} is outside [{least}, {2**31 - 1}]")
+    count = len(element.children)
+    if name in THRESHOLDS and not (1 <= value <= count or -count <= value <= -1):
+        raise CompileError(
+            element.place,
+            f"{name}={value} can never be met by {count} children, or needs none",
+            f"1 to {count}, or -1 (all) down to -{count}",
+        )
     return value
 
 
@@ -72,7 +91,10 @@ def _check_attributes(element: Element, allowed: set[str]) -> None:
     for attribute in element.attributes:
         if attribute in CONDITION_ATTRIBUTES:
             raise CompileError(element.place, f"the attribute {attribute} is not supported", "use nodes instead")
-        if attribute not in allowed:
+        if attribute == "catch_on_halt" and element.tag == "TryCatch":
+            if element.attributes[attribute] != "false":
+                raise CompileError(element.place, "catch_on_halt is not supported", "give the last child's work to a halt handler")
+        elif attribute not in allowed:
             raise CompileError(element.place, f"<{element.tag}> has no attribute '{attribute}'", nearest(attribute, allowed))
 
 
@@ -91,26 +113,19 @@ def _leaf_node(element: Element, leaf: Leaf, *, explicit: bool) -> Node:
     return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, port_values=tuple(values))
 
 
-def _inner_node(element: Element, kind: NodeType) -> Node:
-    parameter = kind.parameter.partition("=")[0]
-    _check_attributes(element, {*PLAIN_ATTRIBUTES, *([parameter] if parameter else [])})
+def _built_in_node(element: Element, kind: NodeType) -> Node:
+    _check_attributes(element, {*PLAIN_ATTRIBUTES, *(parameter.name for parameter in kind.parameters)})
     count = len(element.children)
     if not kind.least_children <= count <= kind.most_children:
         raise CompileError(element.place, f"<{kind.name}> needs {kind.arity_text()} child node(s), and has {count}")
-    value = _parameter(element, kind)
-    if kind.name == "ReactiveParallel" and value is not None and not (1 <= value <= count or -count <= value <= -1):
-        raise CompileError(
-            element.place,
-            f"success_count={value} can never be met by {count} children, or needs none",
-            f"1 to {count}, or -1 (all) down to -{count}",
-        )
-    return Node(kind, element.attributes.get("name", kind.name), element.place, value)
+    parameters = tuple(_parameter(element, parameter) for parameter in kind.parameters)
+    return Node(kind, element.attributes.get("name", kind.name), element.place, parameters)
 
 
 def _make_node(element: Element, leaves: dict[str, Leaf]) -> Node:
-    inner = {name: kind for name, kind in node_types().items() if kind.category != "LEAF"}
-    if element.tag in inner:
-        return _inner_node(element, inner[element.tag])
+    built_in = {name: kind for name, kind in node_types().items() if name not in USER_KINDS}
+    if element.tag in built_in:
+        return _built_in_node(element, built_in[element.tag])
     if element.tag in ("Action", "Condition"):
         leaf_id, explicit = element.attributes.get("ID", ""), True
     else:
@@ -121,8 +136,8 @@ def _make_node(element: Element, leaves: dict[str, Leaf]) -> Node:
             raise CompileError(element.place, f"'{leaf_id}' is declared as {leaf.kind}, at {leaf.place}")
         return _leaf_node(element, leaf, explicit=explicit)
     if leaf_id in NOT_SUPPORTED:
-        raise CompileError(element.place, f"<{leaf_id}> is not supported yet", f"supported: {', '.join(inner)}")
-    raise CompileError(element.place, f"unknown node '{leaf_id}'", nearest(leaf_id, [*leaves, *inner]))
+        raise CompileError(element.place, f"<{leaf_id}> is not supported yet", f"supported: {', '.join(built_in)}")
+    raise CompileError(element.place, f"unknown node '{leaf_id}'", nearest(leaf_id, [*leaves, *built_in]))
 
 
 def _build(top: Element, leaves: dict[str, Leaf]) -> Node:

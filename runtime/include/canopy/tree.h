@@ -26,7 +26,7 @@
 
 /** Types of nodes, in the order of nodes.def. */
 typedef enum {
-#define CANOPY_NODE(id, name, category, least, most, words, parameter, text) CANOPY_NODE_##id,
+#define CANOPY_NODE(id, name, category, least, most, words, count, parameters, text) CANOPY_NODE_##id,
 #include "canopy/nodes.def"
 #undef CANOPY_NODE
     CANOPY_NODE_TYPES
@@ -42,8 +42,8 @@ typedef struct {
     uint16_t parent;    /**< Index of the parent; the root names itself, 0. */
     uint16_t end;       /**< Index after the last descendant. */
     uint16_t state;     /**< First of the node's state words; any value when the type has none. */
-    uint16_t leaf;      /**< Leaves: index in canopy_tree_t.leaves. Else 0. */
-    uint16_t parameter; /**< Leaves: handed to the leaf's functions. Else: index in canopy_tree_t.parameters. */
+    uint16_t leaf;      /**< Your leaves: index in canopy_tree_t.leaves. Else 0. */
+    uint16_t parameter; /**< Your leaves: handed to their functions. Else: first index in canopy_tree_t.parameters. */
 } canopy_node_t;
 
 /**
@@ -65,7 +65,7 @@ typedef struct {
 typedef struct {
     const canopy_node_t *nodes;
     const canopy_leaf_t *leaves;
-    const int32_t *parameters; /**< Parameters of control nodes and decorators, in the unit of the XML attribute. */
+    const int32_t *parameters; /**< Parameters of the other nodes, in the unit of the XML attribute. */
     uint16_t node_count;       /**< 1..CANOPY_NODES_MAX. */
     uint16_t leaf_count;
     uint16_t parameter_count;
@@ -129,6 +129,12 @@ canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now
  * Not to be called from a leaf.
  */
 void canopy_tree_halt(canopy_tree_instance_t *self);
+
+/**
+ * Halts the whole tree and forgets what outlives a halt: a RunOnce has not run, a SequenceWithMemory starts at its first
+ * child. The fault counter stays. O(nodes). Not to be called from a leaf.
+ */
+void canopy_tree_reset(canopy_tree_instance_t *self);
 
 /** Status of a node now: IDLE for one that its parent has reset. node must be < node_count. */
 static inline canopy_status_t canopy_tree_status(const canopy_tree_instance_t *self, uint16_t node)

@@ -22,7 +22,7 @@ static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree
     const canopy_node_t *nodes = self->tree->nodes;
     int32_t counts[CANOPY_SKIPPED + 1] = {0};
     int32_t children = 0;
-    int32_t needed = canopy_parameter(self, node);
+    int32_t needed;
 
     for (uint16_t child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
         counts[self->status[child]]++;
@@ -32,9 +32,7 @@ static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree
         return CANOPY_SKIPPED;
     }
     children -= counts[CANOPY_SKIPPED];
-    if (needed < 0) {
-        needed += children + 1;
-    }
+    needed = canopy_threshold(canopy_parameter(self, node, 0), children);
     if (counts[CANOPY_SUCCESS] >= needed) {
         return CANOPY_SUCCESS;
     }

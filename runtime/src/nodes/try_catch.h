@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * TryCatch: all children but the last as a Sequence; when one fails, they are reset and the last child, the handler, is
+ * ticked until it is done. Then the node fails, whatever the handler returned.
+ *
+ * State: the RUNNING child, valid while the node is RUNNING.
+ */
+#ifndef CANOPY_NODES_TRY_CATCH_H
+#define CANOPY_NODES_TRY_CATCH_H
+
+#include "../engine.h"
+
+static inline canopy_step_t canopy_try_catch_enter(canopy_tree_instance_t *self, uint16_t node)
+{
+    return canopy_resumes(self, node) ? *canopy_words(self, node) : node + 1u;
+}
+
+/** The last child. O(children). */
+static inline uint16_t canopy_try_catch_handler(const canopy_tree_instance_t *self, uint16_t node)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t child = (uint16_t)(node + 1u);
+
+    while (nodes[child].end != nodes[node].end) {
+        child = nodes[child].end;
+    }
+    return child;
+}
+
+static inline canopy_step_t canopy_try_catch_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                   canopy_status_t status)
+{
+    const canopy_node_t *nodes = self->tree->nodes;
+    uint16_t first = (uint16_t)(node + 1u);
+    uint16_t next = nodes[child].end;
+    bool all_skipped = true;
+
+    if (status == CANOPY_RUNNING) {
+        *canopy_words(self, node) = child;
+        return canopy_done(CANOPY_RUNNING);
+    }
+    if (next == nodes[node].end) {
+        (void)canopy_reset_children(self, node, first);
+        return canopy_done(CANOPY_FAILURE);
+    }
+    if (status == CANOPY_FAILURE) {
+        (void)canopy_reset_children(self, node, first);
+        return canopy_try_catch_handler(self, node);
+    }
+    if (nodes[next].end != nodes[node].end) {
+        return next;
+    }
+    for (child = first; child != next; child = nodes[child].end) {
+        all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
+    }
+    (void)canopy_reset_children(self, node, first);
+    return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
+}
+
+#endif
