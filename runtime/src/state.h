@@ -3,7 +3,7 @@
 #ifndef CANOPY_STATE_H
 #define CANOPY_STATE_H
 
-#include "engine.h"
+#include "canopy/node.h"
 
 /** A 32-bit number in two words. */
 static inline uint32_t canopy_get32(const uint16_t words[2])

@@ -4,13 +4,17 @@
 
 #include <stddef.h>
 
-#include "engine.h"
+#include "canopy/node.h"
 #include "nodes/async_sequence.h"
+#include "nodes/attributes.h"
 #include "nodes/delay.h"
+#include "nodes/entry_updated.h"
 #include "nodes/if_then_else.h"
 #include "nodes/leaf.h"
+#include "nodes/loop.h"
 #include "nodes/parallel.h"
 #include "nodes/parallel_all.h"
+#include "nodes/precondition.h"
 #include "nodes/reactive.h"
 #include "nodes/reactive_parallel.h"
 #include "nodes/repeat.h"
@@ -18,8 +22,10 @@
 #include "nodes/run_once.h"
 #include "nodes/sequence.h"
 #include "nodes/sequence_with_memory.h"
+#include "nodes/switch.h"
 #include "nodes/timeout.h"
 #include "nodes/try_catch.h"
+#include "nodes/user.h"
 #include "nodes/while_do_else.h"
 
 /** Every node IDLE, every state word 0. */
@@ -108,6 +114,23 @@ static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
         return canopy_timeout_enter(self, node);
     case CANOPY_NODE_RUN_ONCE:
         return canopy_run_once_enter(self, node);
+    case CANOPY_NODE_PRECONDITION:
+        return canopy_precondition_enter(self, node);
+    case CANOPY_NODE_ATTRIBUTES:
+        return canopy_attributes_enter(self, node);
+    case CANOPY_NODE_SKIP_UNLESS_UPDATED:
+        return canopy_entry_updated_enter(self, node, CANOPY_SKIPPED);
+    case CANOPY_NODE_WAIT_VALUE_UPDATE:
+        return canopy_entry_updated_enter(self, node, CANOPY_RUNNING);
+    case CANOPY_NODE_WAS_ENTRY_UPDATED:
+        return canopy_was_entry_updated_enter(self, node);
+    case CANOPY_NODE_LOOP:
+        return canopy_loop_enter(self, node);
+    case CANOPY_NODE_SWITCH:
+        return canopy_switch_enter(self, node);
+    case CANOPY_NODE_USER_CONTROL:
+    case CANOPY_NODE_USER_DECORATOR:
+        return canopy_user_enter(self, node);
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -163,12 +186,26 @@ static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t no
         return canopy_timeout_child(self, child, status);
     case CANOPY_NODE_RUN_ONCE:
         return canopy_run_once_child(self, node, child, status);
+    case CANOPY_NODE_PRECONDITION:
+    case CANOPY_NODE_SKIP_UNLESS_UPDATED:
+    case CANOPY_NODE_WAIT_VALUE_UPDATE:
+        return canopy_pass_on(self, child, status);
+    case CANOPY_NODE_ATTRIBUTES:
+        return canopy_attributes_child(self, node, child, status);
+    case CANOPY_NODE_LOOP:
+        return canopy_loop_child(self, child, status);
+    case CANOPY_NODE_SWITCH:
+        return canopy_switch_child(self, node, child, status);
+    case CANOPY_NODE_USER_CONTROL:
+    case CANOPY_NODE_USER_DECORATOR:
+        return canopy_user_child(self, node, child, status);
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
     case CANOPY_NODE_STATEFUL_ACTION:
     case CANOPY_NODE_ALWAYS_SUCCESS:
     case CANOPY_NODE_ALWAYS_FAILURE:
     case CANOPY_NODE_SLEEP:
+    case CANOPY_NODE_WAS_ENTRY_UPDATED:
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -188,6 +225,13 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
         break;
     case CANOPY_NODE_DELAY:
         canopy_delay_halt(self, node);
+        break;
+    case CANOPY_NODE_ATTRIBUTES:
+        canopy_attributes_halt(self, node);
+        break;
+    case CANOPY_NODE_USER_CONTROL:
+    case CANOPY_NODE_USER_DECORATOR:
+        canopy_user_halt(self, node);
         break;
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
@@ -213,6 +257,12 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
     case CANOPY_NODE_TIMEOUT:
     case CANOPY_NODE_RUN_ONCE:
+    case CANOPY_NODE_PRECONDITION:
+    case CANOPY_NODE_SKIP_UNLESS_UPDATED:
+    case CANOPY_NODE_WAIT_VALUE_UPDATE:
+    case CANOPY_NODE_WAS_ENTRY_UPDATED:
+    case CANOPY_NODE_LOOP:
+    case CANOPY_NODE_SWITCH:
     case CANOPY_NODE_TYPES:
         break;
     }

@@ -18,25 +18,69 @@ static const canopy_shape_t shapes[CANOPY_NODE_TYPES] = {
 #undef CANOPY_NODE
 };
 
-/** A leaf of the user's has all the functions that its kind needs. */
-static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+/** Is parameter `which` of the node a script, or none where that is allowed? */
+static bool script_fits(const canopy_tree_t *tree, const canopy_node_t *node, unsigned which, int32_t least)
 {
-    const canopy_leaf_t *leaf;
+    int32_t script = tree->parameters[node->parameter + which];
 
-    if (node->leaf >= tree->leaf_count) {
-        return false;
-    }
-    leaf = &tree->leaves[node->leaf];
-    if (node->type == (uint8_t)CANOPY_NODE_STATEFUL_ACTION) {
-        return leaf->tick != NULL && leaf->running != NULL && leaf->halted != NULL;
-    }
-    return leaf->tick != NULL;
+    return script >= least && script < (int32_t)tree->script_count && (script < 0 || tree->scripts[script] != NULL);
 }
 
-static bool calls_the_application(const canopy_node_t *node)
+/** Is parameter `which` of the node a status that a node can return? */
+static bool status_fits(const canopy_tree_t *tree, const canopy_node_t *node, unsigned which)
 {
-    return node->type == (uint8_t)CANOPY_NODE_CONDITION || node->type == (uint8_t)CANOPY_NODE_SYNC_ACTION ||
-           node->type == (uint8_t)CANOPY_NODE_STATEFUL_ACTION;
+    int32_t status = tree->parameters[node->parameter + which];
+
+    return status > (int32_t)CANOPY_IDLE && status <= (int32_t)CANOPY_SKIPPED;
+}
+
+/** All parameters of an Attributes node are scripts, or none. */
+static bool attributes_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+{
+    for (unsigned which = 0; which < shapes[CANOPY_NODE_ATTRIBUTES].parameters; which++) {
+        if (!script_fits(tree, node, which, -1)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/** Parameters that name scripts and statuses; the parameters themselves are known to be there. */
+static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
+{
+    const uint8_t type = node->type;
+
+    if (type == (uint8_t)CANOPY_NODE_ATTRIBUTES) {
+        return attributes_fit(tree, node);
+    }
+    if (type == (uint8_t)CANOPY_NODE_PRECONDITION || type == (uint8_t)CANOPY_NODE_LOOP) {
+        return script_fits(tree, node, 0, 0) && status_fits(tree, node, 1);
+    }
+    if (type == (uint8_t)CANOPY_NODE_SKIP_UNLESS_UPDATED || type == (uint8_t)CANOPY_NODE_WAIT_VALUE_UPDATE ||
+        type == (uint8_t)CANOPY_NODE_WAS_ENTRY_UPDATED || type == (uint8_t)CANOPY_NODE_SWITCH) {
+        return script_fits(tree, node, 0, 0);
+    }
+    return true;
+}
+
+/** A node of the user's own has the functions that its kind needs. */
+static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+{
+    const uint8_t type = node->type;
+
+    if (type == (uint8_t)CANOPY_NODE_USER_CONTROL || type == (uint8_t)CANOPY_NODE_USER_DECORATOR) {
+        const canopy_control_t *control = node->leaf < tree->control_count ? &tree->controls[node->leaf] : NULL;
+
+        return control != NULL && control->enter != NULL && control->child != NULL;
+    }
+    if (type == (uint8_t)CANOPY_NODE_CONDITION || type == (uint8_t)CANOPY_NODE_SYNC_ACTION ||
+        type == (uint8_t)CANOPY_NODE_STATEFUL_ACTION) {
+        const canopy_leaf_t *leaf = node->leaf < tree->leaf_count ? &tree->leaves[node->leaf] : NULL;
+
+        return leaf != NULL && leaf->tick != NULL &&
+               (type != (uint8_t)CANOPY_NODE_STATEFUL_ACTION || (leaf->running != NULL && leaf->halted != NULL));
+    }
+    return true;
 }
 
 /** The node's own fields: its state words, its parameters, its functions. */
@@ -44,7 +88,7 @@ static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, con
 {
     return (shape->words == 0u || (uint32_t)node->state + shape->words <= tree->word_count) &&
            (shape->parameters == 0u || (uint32_t)node->parameter + shape->parameters <= tree->parameter_count) &&
-           (!calls_the_application(node) || functions_fit(tree, node));
+           functions_fit(tree, node) && meaning_fits(tree, node);
 }
 
 /** The children: each lies within the node, names it as parent, and their number suits the type. */
@@ -67,7 +111,8 @@ static bool children_fit(const canopy_tree_t *tree, uint16_t index, const canopy
 canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_node)
 {
     if (tree == NULL || tree->nodes == NULL || tree->node_count == 0u || tree->node_count > CANOPY_NODES_MAX ||
-        (tree->leaf_count != 0u && tree->leaves == NULL) ||
+        (tree->leaf_count != 0u && tree->leaves == NULL) || (tree->control_count != 0u && tree->controls == NULL) ||
+        (tree->script_count != 0u && tree->scripts == NULL) ||
         (tree->parameter_count != 0u && tree->parameters == NULL)) {
         return CANOPY_ERROR_ARGUMENT;
     }

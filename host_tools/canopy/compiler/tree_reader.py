@@ -19,6 +19,9 @@ PLAIN_ATTRIBUTES = ("name", "_uid", "_description")
 # Kinds of the user's own leaves: their names in XML are those of the leaves.
 USER_KINDS = ("Condition", "SyncAction", "StatefulAction")
 
+# Rows of nodes.def that are made by the compiler, and are no names in XML.
+INTERNAL = ("Attributes", "Loop", "Switch", "Control", "Decorator")
+
 # Of BehaviorTree.CPP 4, and known to be missing here: refused by name, not as a typing error.
 NOT_SUPPORTED = frozenset(
     "SubTree Switch2 Switch3 Switch4 Switch5 Switch6 LoopInt LoopBool LoopDouble LoopString Precondition "
@@ -122,8 +125,14 @@ def _built_in_node(element: Element, kind: NodeType) -> Node:
     return Node(kind, element.attributes.get("name", kind.name), element.place, parameters)
 
 
+def built_in_types() -> dict[str, NodeType]:
+    """The node types that XML can name."""
+    hidden = {*USER_KINDS, *INTERNAL, *NOT_SUPPORTED}
+    return {name: kind for name, kind in node_types().items() if name not in hidden}
+
+
 def _make_node(element: Element, leaves: dict[str, Leaf]) -> Node:
-    built_in = {name: kind for name, kind in node_types().items() if name not in USER_KINDS}
+    built_in = built_in_types()
     if element.tag in built_in:
         return _built_in_node(element, built_in[element.tag])
     if element.tag in ("Action", "Condition"):
@@ -188,6 +197,9 @@ def read_tree(path: Path) -> Tree:
             trees[tree_id] = element
         elif element.tag == "TreeNodesModel":
             leaves |= read_leaves(element)
+            for leaf in leaves.values():
+                if leaf.id in built_in_types() or leaf.id in NOT_SUPPORTED:
+                    raise CompileError(leaf.place, f"'{leaf.id}' is the name of a built-in node", "choose another ID")
         else:
             allowed = ("BehaviorTree", "TreeNodesModel")
             raise CompileError(element.place, f"<{element.tag}> is not supported here", nearest(element.tag, allowed))

@@ -42,8 +42,8 @@ typedef struct {
     uint16_t parent;    /**< Index of the parent; the root names itself, 0. */
     uint16_t end;       /**< Index after the last descendant. */
     uint16_t state;     /**< First of the node's state words; any value when the type has none. */
-    uint16_t leaf;      /**< Your leaves: index in canopy_tree_t.leaves. Else 0. */
-    uint16_t parameter; /**< Your leaves: handed to their functions. Else: first index in canopy_tree_t.parameters. */
+    uint16_t leaf;      /**< Your nodes: index in canopy_tree_t.leaves or .controls. Else 0. */
+    uint16_t parameter; /**< Your nodes: which of the kind's uses this is. Else: first index in canopy_tree_t.parameters. */
 } canopy_node_t;
 
 /**
@@ -61,19 +61,38 @@ typedef struct {
     void (*halted)(void *application, uint16_t parameter);
 } canopy_leaf_t;
 
-/** A tree: constant tables. */
+/**
+ * A script of the tree, compiled to C.
+ * @return the value of its last expression: 0 is false; an index; a count
+ */
+typedef int32_t (*canopy_script_t)(void *application);
+
+struct canopy_tree_instance;
+
+/** The functions of one kind of control node or decorator of your own; canopy/node.h is their manual. */
+typedef struct {
+    uint32_t (*enter)(struct canopy_tree_instance *self, uint16_t node);
+    uint32_t (*child)(struct canopy_tree_instance *self, uint16_t node, uint16_t child, canopy_status_t status);
+    void (*halt)(struct canopy_tree_instance *self, uint16_t node); /**< NULL: nothing to forget. */
+} canopy_control_t;
+
+/** A tree: constant tables. A table may be NULL when its count is 0. */
 typedef struct {
     const canopy_node_t *nodes;
     const canopy_leaf_t *leaves;
+    const canopy_control_t *controls;
+    const canopy_script_t *scripts;
     const int32_t *parameters; /**< Parameters of the other nodes, in the unit of the XML attribute. */
     uint16_t node_count;       /**< 1..CANOPY_NODES_MAX. */
     uint16_t leaf_count;
+    uint16_t control_count;
+    uint16_t script_count;
     uint16_t parameter_count;
     uint16_t word_count; /**< State words of all nodes together. */
 } canopy_tree_t;
 
 /** One running instance of a tree. Set up by canopy_tree_init(); read the counters, leave the rest alone. */
-typedef struct {
+typedef struct canopy_tree_instance {
     const canopy_tree_t *tree;
     void *application;
     uint8_t *status; /**< A status code a node, see canopy_tree_status_code(). */

@@ -10,7 +10,7 @@
 #ifndef CANOPY_NODES_ASYNC_SEQUENCE_H
 #define CANOPY_NODES_ASYNC_SEQUENCE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 enum { CANOPY_ASYNC_RESUME = 0, CANOPY_ASYNC_WAS_RUNNING = 1 };
 

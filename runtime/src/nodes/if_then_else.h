@@ -8,7 +8,7 @@
 #ifndef CANOPY_NODES_IF_THEN_ELSE_H
 #define CANOPY_NODES_IF_THEN_ELSE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_if_then_else_enter(canopy_tree_instance_t *self, uint16_t node)
 {

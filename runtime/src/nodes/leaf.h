@@ -7,7 +7,7 @@
 #ifndef CANOPY_NODES_LEAF_H
 #define CANOPY_NODES_LEAF_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 /** Rule 7. Out of line: the tick's fast path never gets here. */
 canopy_status_t canopy_leaf_fault(canopy_tree_instance_t *self, uint16_t node);

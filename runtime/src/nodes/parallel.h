@@ -9,7 +9,7 @@
 #ifndef CANOPY_NODES_PARALLEL_H
 #define CANOPY_NODES_PARALLEL_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 enum {
     CANOPY_PARALLEL_SUCCESSES = 0,

@@ -7,7 +7,7 @@
 #ifndef CANOPY_NODES_REACTIVE_H
 #define CANOPY_NODES_REACTIVE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_reactive_enter(uint16_t node)
 {

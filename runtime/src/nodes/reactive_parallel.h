@@ -9,7 +9,7 @@
 #ifndef CANOPY_NODES_REACTIVE_PARALLEL_H
 #define CANOPY_NODES_REACTIVE_PARALLEL_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_reactive_parallel_enter(uint16_t node)
 {

@@ -7,7 +7,7 @@
 #ifndef CANOPY_NODES_RESULT_H
 #define CANOPY_NODES_RESULT_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_result_enter(uint16_t node)
 {

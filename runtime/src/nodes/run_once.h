@@ -8,7 +8,7 @@
 #ifndef CANOPY_NODES_RUN_ONCE_H
 #define CANOPY_NODES_RUN_ONCE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_run_once_enter(canopy_tree_instance_t *self, uint16_t node)
 {

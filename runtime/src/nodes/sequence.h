@@ -9,7 +9,7 @@
 #ifndef CANOPY_NODES_SEQUENCE_H
 #define CANOPY_NODES_SEQUENCE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_sequence_enter(canopy_tree_instance_t *self, uint16_t node)
 {

@@ -9,7 +9,7 @@
 #ifndef CANOPY_NODES_TRY_CATCH_H
 #define CANOPY_NODES_TRY_CATCH_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_try_catch_enter(canopy_tree_instance_t *self, uint16_t node)
 {

@@ -7,7 +7,7 @@
 #ifndef CANOPY_NODES_WHILE_DO_ELSE_H
 #define CANOPY_NODES_WHILE_DO_ELSE_H
 
-#include "../engine.h"
+#include "canopy/node.h"
 
 static inline canopy_step_t canopy_while_do_else_enter(uint16_t node)
 {

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /**
  * @file
- * What the node types share, inside the runtime. A node type is three small functions in a file of src/nodes/:
+ * The interface of a node type: of the built-in ones (src/nodes/), and of control nodes and decorators of your own.
+ *
+ * A node type is three small functions:
  *
  *   enter  the parent (or the tick) has come to this node: what now?
  *   child  the child that enter or child asked for has returned `status`: what now?
@@ -9,17 +11,22 @@
  *
  * enter and child answer with a canopy_step_t: tick that child next, or this node is done for this tick with that
  * status. The engine stores the status. So the tick is a loop, and its stack does not grow with the tree.
+ *
+ * A node that is done with anything but RUNNING has reset its children before (canopy_reset_children()).
+ *
+ * Only for these functions: nothing here may be called from a leaf or from outside a tick.
  */
-#ifndef CANOPY_ENGINE_H
-#define CANOPY_ENGINE_H
+#ifndef CANOPY_NODE_H
+#define CANOPY_NODE_H
 
 #include "canopy/tree.h"
 
-/** Below STEP_DONE: the child to tick. Else STEP_DONE + status. */
+/** What to do next. Below CANOPY_STEP_DONE: tick this child. Else CANOPY_STEP_DONE + status: see canopy_done(). */
 typedef uint32_t canopy_step_t;
 
 #define CANOPY_STEP_DONE 0x10000u
 
+/** The node is done for this tick, with this status. */
 static inline canopy_step_t canopy_done(canopy_status_t status)
 {
     return CANOPY_STEP_DONE + (canopy_step_t)status;
@@ -57,10 +64,18 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
     return all_skipped;
 }
 
-/** A parameter of the node, as written in the XML; `which` counts in the order of nodes.def. */
+/** A parameter of a built-in node, as written in the XML; `which` counts in the order of nodes.def. */
 static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node, unsigned which)
 {
     return self->tree->parameters[self->tree->nodes[node].parameter + which];
+}
+
+/** Runs the script that a parameter of the node names; 0 when it names none. */
+static inline int32_t canopy_run_script(canopy_tree_instance_t *self, uint16_t node, unsigned which)
+{
+    int32_t script = canopy_parameter(self, node, which);
+
+    return script >= 0 ? self->tree->scripts[script](self->application) : 0;
 }
 
 /** The node's state words. */
