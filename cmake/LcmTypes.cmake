@@ -48,7 +48,7 @@ function(canopy_add_lcm_types FOLDER)
         COMMAND "${CMAKE_COMMAND}" -E make_directory "${build}/python"
         COMMAND "${FOLDER}/bin/lcm-gen" --python --ppath "${build}/python" ${types}
         COMMAND "${CMAKE_COMMAND}" -E touch "${build}/python.stamp"
-        DEPENDS ${types}
+        DEPENDS ${types} "${FOLDER}/bin/lcm-gen"
         COMMENT "Generating the LCM types for Python"
         VERBATIM)
     set(made "${build}/python.stamp")
@@ -69,7 +69,7 @@ function(canopy_add_lcm_types FOLDER)
             COMMAND "${CMAKE_COMMAND}" -E chdir "${build}/classes"
                 "${CMAKE_COMMAND}" -E tar cf "${build}/canopy_msgs.jar" --format=zip canopy_msgs
             COMMAND "${CMAKE_COMMAND}" -E rm -rf "${build}/java" "${build}/classes"
-            DEPENDS ${types}
+            DEPENDS ${types} "${FOLDER}/bin/lcm-gen"
             COMMENT "Building canopy_msgs.jar, the LCM types for lcm-spy"
             VERBATIM)
         list(APPEND made "${build}/canopy_msgs.jar")

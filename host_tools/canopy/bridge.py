@@ -94,8 +94,8 @@ class Bridge:
             self.summary.overruns = view.overruns
             if view.lost and not self.summary.lost:
                 click.echo(
-                    f"canopy bridge: {view.lost} trace frames were lost before tick {view.tick}; further losses are "
-                    "counted (trace_lost), not printed",
+                    f"canopy bridge: trace frames are lost on the way ({view.lost} at tick {view.tick}); "
+                    "further ones are counted (trace_lost), not printed",
                     err=True,
                 )
             self.summary.lost = view.lost

@@ -24,7 +24,7 @@ CHANNEL_ROBOT = "CANOPY_ROBOT"
 CHANNEL_ROBOT_COMMAND = "CANOPY_ROBOT_COMMAND"
 
 _MEND_ROUTE = "ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo"
-_MEND_PACKAGE = "pip install lcm"
+_NO_PACKAGE = "the Python package lcm is not installed; mend with: pip install lcm"
 _MEND_GLIB = "apt-get install libglib2.0-0"
 _MEND_TYPES = "cmake --build build/host --target lcm_types (and build/host/lcm/python on PYTHONPATH)"
 
@@ -58,13 +58,13 @@ def open_lcm(url: str, what: str) -> lcm.LCM | None:
 
 def _missing_package() -> str | None:
     try:
-        import lcm  # noqa: F401
+        import lcm
     except ModuleNotFoundError:
-        return f"the Python package lcm is not installed; mend with: {_MEND_PACKAGE}"
+        return _NO_PACKAGE
     except ImportError as error:
-        mend = _MEND_GLIB if "libglib" in str(error) else _MEND_PACKAGE
-        return f"{error}; mend with: {mend}"
-    return None
+        return f"{error}; mend with: {_MEND_GLIB if 'libglib' in str(error) else 'pip install --force-reinstall lcm'}"
+    # Any folder lcm/ on Python's path, such as the one with the .lcm files, can be imported, and is no package.
+    return _NO_PACKAGE if getattr(lcm, "__file__", None) is None else None
 
 
 def _missing_types() -> str | None:

@@ -89,7 +89,7 @@ class SignalTable:
             self.refused += 1
             return False
         watched.values = {
-            signal.name: str(value) if not isinstance(value := decoded[signal.name], (int, float)) else value
+            signal.name: _as_written(signal, decoded[signal.name])
             for signal in watched.signals
             if signal.name in decoded
         }
@@ -146,6 +146,15 @@ def _read(watched: _Watched, signal: DbcSignal, now: float) -> Reading:
     )
 
 
+def _as_written(signal: DbcSignal, value: object) -> float | str:
+    """The value as one would write it: 49.3, not 49.300000000000004."""
+    if isinstance(value, int):
+        return value
+    if isinstance(value, float):
+        return value if signal.is_float else round(value, _decimals(signal))
+    return str(value)
+
+
 def _decimals(signal: DbcSignal) -> int:
-    exponent = Decimal(str(signal.scale)).normalize().as_tuple().exponent
-    return max(0, -exponent) if isinstance(exponent, int) else 0
+    exponents = (Decimal(str(number)).normalize().as_tuple().exponent for number in (signal.scale, signal.offset))
+    return max(0, *(-exponent for exponent in exponents if isinstance(exponent, int)))

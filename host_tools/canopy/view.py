@@ -70,8 +70,8 @@ def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> R
     """The controller as a picture for a terminal: tree, signals, one line on its health."""
     silent = watch.silent_for(now) is not None
     table = Table.grid(padding=(0, 1), expand=True)
-    table.add_column(ratio=3)
-    table.add_column(ratio=2)
+    table.add_column(ratio=1)
+    table.add_column(ratio=1)
     table.add_row(
         Panel(_tree(watch, silent, ascii_only), title=Text(watch.model.tree_id), title_align="left"),
         Panel(_signals(watch, now), title="signals", title_align="left"),
@@ -114,7 +114,7 @@ def _signals(watch: Watch, now: float) -> Table:
             table.add_row(Text(message, style="bold"), Text(direction, style="bright_black"))
         style = "red" if reading.stale else "bright_black" if reading.value is None else "cyan"
         table.add_row(
-            Text(f"  {reading.signal}"), Text(reading.text + (" (stale)" if reading.stale else ""), style=style)
+            Text(f"  {reading.signal}"), Text(reading.text + (" stale" if reading.stale else ""), style=style)
         )
     return table
 

@@ -54,7 +54,10 @@ def remove(*place: str | int) -> Callable[[Any], None]:
         (change("tree", "nodes", to=[]), "tree.nodes: is empty"),
         (change("tree", "nodes", 1, to=3), "tree.nodes[1]: must be a JSON object"),
         (remove("tree", "nodes", 2, "name"), "tree.nodes[2].name: is missing"),
-        (change("tree", "nodes", 2, "category", to="leaf"), "tree.nodes[2].category: is 'leaf', must be one of control"),
+        (
+            change("tree", "nodes", 2, "category", to="leaf"),
+            "tree.nodes[2].category: is 'leaf', must be one of control",
+        ),
         (change("tree", "nodes", 2, "parent", to=1), "tree.nodes[2]: is not in depth-first order"),
         (change("tree", "nodes", 2, "index", to=3), "tree.nodes[2]: is not in depth-first order"),
         (change("tree", "nodes", 0, "end", to=3), "tree.nodes[3]: is not in depth-first order"),

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -37,7 +36,9 @@ def runs(draw: st.DrawFn) -> tuple[int, list[list[int]]]:
 
 
 @given(run=runs())
-def test_without_losses_every_tick_is_shown_as_it_was(models: dict[int, Model], run: tuple[int, list[list[int]]]) -> None:
+def test_without_losses_every_tick_is_shown_as_it_was(
+    models: dict[int, Model], run: tuple[int, list[list[int]]]
+) -> None:
     nodes, ticks = run
     source, decoder = TraceSource(nodes), TraceDecoder(models[nodes])
     known: set[int] = set()
@@ -122,7 +123,7 @@ def test_a_restart_is_no_loss(models: dict[int, Model], before: int, missing: in
         feed(decoder, old.frames([1, 3, 1, 0], overruns=5))
     new = TraceSource(4)
     views = feed(decoder, [frame for _ in range(3) for frame in new.frames([0, 0, 0, 0], root=0)][missing:])
-    # Tick 0, Snapshot, Tick 1 …: joined late, the new run may look like a step ahead only when the old one was as young.
+    # Tick 0, Snapshot, Tick 1 …: joined late, a new run looks like the old one's next ticks when that was as young.
     if missing == 0 or before > 1:
         assert decoder.restarts == 1
         assert decoder.lost == 0

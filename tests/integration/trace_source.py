@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A controller's trace as cantools writes it, from the DBC alone: an oracle for the decoder that shares no code with it."""
+"""A controller's trace as cantools writes it, from the DBC alone: it shares no code with the decoder."""
 
 from __future__ import annotations
 
@@ -32,7 +32,11 @@ def model_data(nodes: int) -> dict[str, Any]:
         "application": "nao_home",
         "hash": "0123456789abcdef",
         "period_us": 50000,
-        "tree": {"id": "GetHome", "file": "x.xml", "nodes": [{"index": 0, "parent": None, "end": nodes, **root}, *leaves]},
+        "tree": {
+            "id": "GetHome",
+            "file": "x.xml",
+            "nodes": [{"index": 0, "parent": None, "end": nodes, **root}, *leaves],
+        },
         "bus": {
             "dbc": "nao.dbc",
             "node": "Controller",

@@ -77,7 +77,7 @@ class Candump:
     def frame(self) -> str:
         """Returns the next frame, as cansend takes it.
 
-        Kernels from 6.0 on mark a CAN FD frame with 4 in its flags, which candump prints; cansend writes none.
+        Newer kernels mark a CAN FD frame with 4 in its flags, which candump prints and cansend does not need.
         """
         assert self.process.stdout is not None
         text = self.process.stdout.readline().split()[2]
