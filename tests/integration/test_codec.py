@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The generated codec against cantools: random messages of every byte order, sign and length, both ways, bit for bit."""
+"""The generated codec against cantools: random messages of every byte order, sign and length, bit for bit."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from pathlib import Path
 
 import cantools.database
 import pytest
+from click.testing import CliRunner
+
 from canopy.cli import main
 from canopy.compiler.bus_reader import Bus, Message, read_bus
 from canopy.compiler.codec import value_type
-from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[2]
 SEED = int(os.environ.get("CANOPY_SEED", "20261123"))
@@ -36,7 +37,7 @@ TREE = """<root BTCPP_format="4"><BehaviorTree ID="T"><Ready/></BehaviorTree>
 def _random_signals(rng: random.Random, length: int) -> list[str]:
     """Signal lines that fill a message of `length` bytes with no overlap. A Motorola signal starts at its top bit."""
     free = set(range(8 * length))
-    lines = []
+    lines: list[str] = []
     wanted = rng.randint(1, 6)
     for number in range(20):
         if len(lines) == wanted:
@@ -111,13 +112,22 @@ def codec(dbc: Path) -> Codec:
     bus = read_bus(dbc, "Controller", 50)
     (folder / "harness.c").write_text(_harness(bus))
     library = folder / "codec.so"
-    flags = "-std=c11 -O1 -g -shared -fPIC -Wall -Wextra -Werror -Wconversion -Wsign-conversion".split()
-    subprocess.run(
-        [os.environ.get("CC", "cc"), *flags, "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
-        + [f"-I{ROOT / 'runtime' / 'include'}", f"-I{folder / 'out'}", "-Wno-missing-prototypes"]
-        + [str(folder / "harness.c"), str(folder / "out" / "random_bus.c"), "-o", str(library)],
-        check=True,
-    )
+    flags = [
+        "-std=c11",
+        "-O1",
+        "-g",
+        "-shared",
+        "-fPIC",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-Wconversion",
+        "-Wsign-conversion",
+    ]
+    undefined = ["-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
+    includes = [f"-I{ROOT / 'runtime' / 'include'}", f"-I{folder / 'out'}"]
+    sources = [str(folder / "harness.c"), str(folder / "out" / "random_bus.c")]
+    subprocess.run([os.environ.get("CC", "cc"), *flags, *undefined, *includes, *sources, "-o", str(library)], check=True)
     database = cantools.database.load_file(str(dbc))
     assert isinstance(database, cantools.database.can.Database)
     return Codec(bus, database, ctypes.CDLL(str(library)))
@@ -148,7 +158,7 @@ def test_decode_takes_the_bits_that_cantools_takes(codec: Codec) -> None:
             expected = peer.decode(data, scaling=False)
             assert isinstance(expected, dict)
             found = {s.name: values[n] for n, s in enumerate(message.signals)}
-            assert found == {name: _wrap(int(value)) for name, value in expected.items()}, message
+            assert found == {name: _wrap(int(str(value))) for name, value in expected.items()}, message
 
 
 def _random_values(rng: random.Random, message: Message) -> dict[str, int]:
