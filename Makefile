@@ -2,6 +2,7 @@
 # A few lines over CMakePresets.json and a Python environment in build/venv. `make help` lists the targets.
 MAKEFLAGS += --no-print-directory
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+export PYTHON3
 export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
 PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
@@ -29,7 +30,7 @@ test-host: # unit tests on this machine
 	$(call BUILD,host)
 	ctest --preset host
 
-test-firmware: # the same tests on QEMU's Cortex-M4, and the sizes for Cortex-M0+ and Cortex-M4
+test-firmware: # the same tests as firmware in QEMU, and the sizes of the code for Cortex-M0+ and Cortex-M4
 	$(call BUILD,firmware-m0plus)
 	$(call BUILD,firmware-m4)
 	ctest --preset firmware-m0plus
