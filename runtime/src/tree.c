@@ -180,12 +180,10 @@ static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t no
         return canopy_repeat_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
         return canopy_repeat_child(self, node, child, status, CANOPY_FAILURE);
-    case CANOPY_NODE_DELAY:
-        return canopy_delay_child(self, node, child, status);
-    case CANOPY_NODE_TIMEOUT:
-        return canopy_timeout_child(self, child, status);
     case CANOPY_NODE_RUN_ONCE:
         return canopy_run_once_child(self, node, child, status);
+    case CANOPY_NODE_DELAY:
+    case CANOPY_NODE_TIMEOUT:
     case CANOPY_NODE_PRECONDITION:
     case CANOPY_NODE_SKIP_UNLESS_UPDATED:
     case CANOPY_NODE_WAIT_VALUE_UPDATE:
@@ -219,13 +217,6 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_STATEFUL_ACTION:
         canopy_stateful_action_halt(self, node);
         break;
-    case CANOPY_NODE_REPEAT:
-    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
-        canopy_repeat_halt(self, node);
-        break;
-    case CANOPY_NODE_DELAY:
-        canopy_delay_halt(self, node);
-        break;
     case CANOPY_NODE_ATTRIBUTES:
         canopy_attributes_halt(self, node);
         break;
@@ -255,6 +246,9 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_FORCE_SUCCESS:
     case CANOPY_NODE_FORCE_FAILURE:
     case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
+    case CANOPY_NODE_REPEAT:
+    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
+    case CANOPY_NODE_DELAY:
     case CANOPY_NODE_TIMEOUT:
     case CANOPY_NODE_RUN_ONCE:
     case CANOPY_NODE_PRECONDITION:

@@ -38,6 +38,12 @@ static inline bool canopy_resumes(const canopy_tree_instance_t *self, uint16_t n
     return self->status[node] == (uint8_t)CANOPY_RUNNING;
 }
 
+/** Does the node go on: was it RUNNING when this tick came to it, or SKIPPED and not reset since? */
+static inline bool canopy_goes_on(const canopy_tree_instance_t *self, uint16_t node)
+{
+    return self->status[node] == (uint8_t)CANOPY_RUNNING || self->status[node] == (uint8_t)CANOPY_SKIPPED;
+}
+
 /** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. */
 void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t node);
 
@@ -48,6 +54,15 @@ static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t chi
         canopy_halt_subtree(self, child);
     }
     self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
+}
+
+/** What a decorator does that only decides whether to tick its child: passes on the child's status. */
+static inline canopy_step_t canopy_pass_on(canopy_tree_instance_t *self, uint16_t child, canopy_status_t status)
+{
+    if (status != CANOPY_RUNNING) {
+        canopy_reset_child(self, child);
+    }
+    return canopy_done(status);
 }
 
 /** Resets the children from `first` to the last one of `node`. @return true when every one of them was SKIPPED. */

@@ -23,12 +23,4 @@ static inline canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, u
     return child;
 }
 
-static inline canopy_step_t canopy_timeout_child(canopy_tree_instance_t *self, uint16_t child, canopy_status_t status)
-{
-    if (status != CANOPY_RUNNING) {
-        canopy_reset_child(self, child);
-    }
-    return canopy_done(status);
-}
-
 #endif
