@@ -26,7 +26,7 @@ static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instan
     if (status == CANOPY_RUNNING || status == CANOPY_FAILURE) {
         *canopy_words(self, node) = child;
         if (status == CANOPY_FAILURE) {
-            (void)canopy_reset_children(self, node, child);
+            (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
         }
         return canopy_done(status);
     }
