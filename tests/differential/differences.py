@@ -21,7 +21,7 @@ RULES: dict[str, str] = {
     "keep running": "KeepRunningUntilFailure turns a SKIPPED child into RUNNING",
     "same tick": "Repeat and RetryUntilSuccessful begin the next cycle in the tick that ends an asynchronous one",
     "memory yields": "SequenceWithMemory yields after every child that completes in the tick it was started in",
-    "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there: its parent's reset halts it, count 0",
+    "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there, and loses its count at other times",
     "skipped action": "a RUNNING action that answers SKIPPED stays RUNNING there",
     "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped then",
 }
@@ -209,9 +209,12 @@ class WhileDoElse(BtCppNode, model.WhileDoElse):
 
 class Decorator(BtCppNode, model.Decorator):
     def tick_child(self) -> int:
-        status = self.children[0].tick()
+        child = self.children[0]
+        status = child.tick()
         if status in COMPLETED:
             self.reset_all()
+        elif status == SKIPPED and isinstance(child, Counting) and child.cycles:
+            self.world.differs("skipped count")
         return status
 
 

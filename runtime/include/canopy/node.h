@@ -21,6 +21,12 @@
 
 #include "canopy/tree.h"
 
+/**
+ * For what a tick needs seldom, or what has a large frame. Taken into the tick's loop it would push the loop's variables
+ * out of the registers, and a frame would stay on the stack while a leaf runs; the figures of `make bench` depend on it.
+ */
+#define CANOPY_SELDOM __attribute__((noinline))
+
 /** What to do next. Below CANOPY_STEP_DONE: tick this child. Else CANOPY_STEP_DONE + status: see canopy_done(). */
 typedef uint32_t canopy_step_t;
 
@@ -74,7 +80,11 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
 
     for (uint16_t child = first; child != end; child = nodes[child].end) {
         all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
-        canopy_reset_child(self, child);
+        /* canopy_reset_child(), but not a call of its own: this is where the stack is deepest. */
+        if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
+            canopy_halt_subtree(self, child);
+        }
+        self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
     }
     return all_skipped;
 }

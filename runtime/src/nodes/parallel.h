@@ -24,8 +24,8 @@ static inline uint16_t canopy_parallel_open_child(const canopy_tree_instance_t *
 {
     const canopy_node_t *nodes = self->tree->nodes;
 
-    while (child != nodes[node].end && (self->status[child] == (uint8_t)CANOPY_SUCCESS ||
-                                        self->status[child] == (uint8_t)CANOPY_FAILURE)) {
+    while (child != nodes[node].end &&
+           (self->status[child] == (uint8_t)CANOPY_SUCCESS || self->status[child] == (uint8_t)CANOPY_FAILURE)) {
         child = nodes[child].end;
     }
     return child;
@@ -62,8 +62,8 @@ static inline canopy_status_t canopy_parallel_verdict(canopy_tree_instance_t *se
     return failures >= failures_needed || children - failures < successes_needed ? CANOPY_FAILURE : CANOPY_RUNNING;
 }
 
-static inline canopy_step_t canopy_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                  canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                         canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t *words = canopy_words(self, node);

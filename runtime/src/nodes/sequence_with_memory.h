@@ -17,8 +17,8 @@ static inline canopy_step_t canopy_sequence_with_memory_enter(canopy_tree_instan
     return child != 0u ? child : node + 1u;
 }
 
-static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
-                                                              uint16_t child, canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
+                                                                     uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     bool all_skipped;

@@ -10,7 +10,7 @@
 
 #include "../state.h"
 
-static inline canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, uint16_t node)
+static CANOPY_SELDOM canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, uint16_t node)
 {
     uint16_t child = (uint16_t)(node + 1u);
 
