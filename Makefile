@@ -9,7 +9,7 @@ PYTEST := $(PYTHON) -m pytest
 SETUP := host_tools/setup
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
-.PHONY: help demo test lint format check-all clean test-host test-firmware test-python test-rig test-clang test-asan
+.PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -23,7 +23,7 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test,differential
+	$(SETUP)/make-venv can,lcm,test,differential,bench
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
@@ -46,13 +46,13 @@ test-rig: # integration tests on vcan0: one guest for all of them
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,differential,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,differential,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(SETUP)/lint --fix
 
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
@@ -72,6 +72,11 @@ test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
 	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration tests/differential
+
+bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
+	$(SETUP)/ensure-packages bench
+	$(SETUP)/make-venv can,lcm,test,differential,bench
+	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md
 
 clean: ## remove everything that was built
 	rm -rf build
