@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random DBC files with every feature.
 
-Byte orders, signs, lengths, scales, ranges, value tables, floats, CAN FD, extended ids, and multiplexed signals, simple and
-nested, with ranges of values.
+Byte orders, signs, lengths, scales, ranges, value tables, floats, CAN FD, extended ids, and multiplexed signals, simple
+and nested, with ranges of values.
 """
 
 from __future__ import annotations
