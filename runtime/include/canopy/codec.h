@@ -18,8 +18,10 @@
 /** What decode says. Whatever is not OK has changed nothing. */
 typedef enum {
     CANOPY_CODEC_OK = 0,
-    CANOPY_CODEC_WRONG_LENGTH = -1, /**< The frame does not have the message's length; encode: there is no room for it. */
-    CANOPY_CODEC_OUT_OF_RANGE = -2  /**< A value outside the DBC's range, NaN, infinity, or no branch of a multiplexer. */
+    CANOPY_CODEC_WRONG_LENGTH =
+        -1, /**< The frame does not have the message's length; encode: there is no room for it. */
+    CANOPY_CODEC_OUT_OF_RANGE =
+        -2 /**< A value outside the DBC's range, NaN, infinity, or no branch of a multiplexer. */
 } canopy_codec_result_t;
 
 #endif
