@@ -17,7 +17,7 @@ _FLAGS = """
 -Wmissing-prototypes -Wvla -Werror
 """
 WARNINGS = _FLAGS.split()
-VALUES_MAX = 64
+VALUES_MAX = 512
 
 
 def as_int64(value: int) -> int:
