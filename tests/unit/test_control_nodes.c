@@ -319,6 +319,17 @@ static void a_single_leaf_is_a_tree(void)
     EXPECT("F", CANOPY_FAILURE, "a");
 }
 
+static void sequence_with_memory_remembers_across_a_halt_what_was_skipped(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE_WITH_MEMORY);
+    EXPECT("KRS", CANOPY_RUNNING, "ab");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("SKK", CANOPY_SKIPPED, "bc");
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    canopy_tree_halt(&bench.instance);
+    EXPECT("KKK", CANOPY_SUCCESS, "bc");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -344,5 +355,6 @@ int main(void)
     RUN_TEST(halting_the_tree_follows_the_same_rule);
     RUN_TEST(statuses_are_kept_for_monitors);
     RUN_TEST(a_single_leaf_is_a_tree);
+    RUN_TEST(sequence_with_memory_remembers_across_a_halt_what_was_skipped);
     return UNITY_END();
 }

@@ -21,7 +21,7 @@ static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instan
                                                               uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
-    bool all_skipped;
+    bool all_skipped = true;
 
     if (status == CANOPY_RUNNING || status == CANOPY_FAILURE) {
         *canopy_words(self, node) = child;
@@ -34,7 +34,11 @@ static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instan
         return nodes[child].end;
     }
     *canopy_words(self, node) = 0;
-    all_skipped = canopy_reset_children(self, node, (uint16_t)(node + 1u));
+    for (child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
+        /* A child before the place where a halt interrupted is IDLE; what it last returned still counts. */
+        all_skipped = all_skipped && (self->status[child] & ~CANOPY_STATUS_WAS) == (unsigned)CANOPY_SKIPPED;
+        canopy_reset_child(self, child);
+    }
     return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
 }
 
