@@ -273,6 +273,7 @@ static void the_validator_refuses_tables_that_a_tick_could_leave(void)
     refuses(1, (canopy_node_t){.type = CANOPY_NODE_TYPES, .end = 2});
     refuses(1, (canopy_node_t){.type = CANOPY_NODE_CONDITION, .end = 2, .leaf = 1});
     refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 2, 0));
+    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 0, 0)); /* shares a word with the Sequence */
     refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 1, 1));
     refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 5, 1, 0));
     refuses(3, (canopy_node_t)ACTION(0, 3, 1));
