@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Writes conformance_table.inc from model.py; with --check, says whether the file is what would be written.
 
-python tests/unit/conformance/make_table.py [--check]
+PYTHONPATH=tests python -m unit.conformance.make_table [--check]
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import model
+from unit.conformance import model
 
 TABLE = Path(__file__).with_name("conformance_table.inc")
 STATUSES = "SFRK"
@@ -38,7 +38,15 @@ def cases() -> Iterator[tuple[str, int, tuple[int, ...]]]:
         yield from ((name, children, ()) for children in (1, 2, 3))
     for name in ("Fallback", "AsyncFallback", "ReactiveFallback"):
         yield from ((name, children, ()) for children in (1, 2, 3))
-    for children, counts in ((1, (-1, 1)), (2, (-1, 1)), (2, (1, 2)), (3, (-1, 1)), (3, (2, 2)), (3, (1, -1)), (3, (-2, 3))):
+    for children, counts in (
+        (1, (-1, 1)),
+        (2, (-1, 1)),
+        (2, (1, 2)),
+        (3, (-1, 1)),
+        (3, (2, 2)),
+        (3, (1, -1)),
+        (3, (-2, 3)),
+    ):
         yield "Parallel", children, counts
     for children, most in ((1, 1), (2, 1), (3, 1), (3, 2), (3, -1)):
         yield "ParallelAll", children, (most,)
@@ -55,7 +63,7 @@ def cases() -> Iterator[tuple[str, int, tuple[int, ...]]]:
     yield from (("RunOnce", 1, (then_skip,)) for then_skip in (0, 1))
 
 
-class NotAnswered(Exception):
+class NotAnsweredError(Exception):
     """The node asks for one more child than has been answered."""
 
 
@@ -82,7 +90,7 @@ def replay(fresh: model.Node, steps: list[str]) -> tuple[model.Node, list[int]]:
                 try:
                     return next(answers)
                 except StopIteration:
-                    raise NotAnswered from None
+                    raise NotAnsweredError from None
 
             fresh.tick(answer)
     return fresh, asked
@@ -100,7 +108,7 @@ def rows(name: str, children: int, parameters: tuple[int, ...]) -> Iterator[str]
             step = waiting.pop(0)
             try:
                 node, asked = replay(start(name, children, parameters), [*histories[number], step])
-            except NotAnswered:
+            except NotAnsweredError:
                 waiting[:0] = [step + status for status in STATUSES]
                 continue
             if node.state() not in numbers:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """One node over leaf children, as docs/semantics.md describes it: the source of the conformance table.
 
-Written from the text alone, without a look at the engine, so that a misreading would have to be made twice. A child is a
-StatefulAction that returns what the table says. Statuses are letters: S success, F failure, R running, K skipped, I idle.
+Written from the text alone, without a look at the engine, so that a misreading would have to be made twice. A child
+is a StatefulAction that returns what the table says. Statuses are letters: S success, F failure, R running, K skipped,
+I idle.
 """
 
 from __future__ import annotations

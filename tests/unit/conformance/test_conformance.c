@@ -302,11 +302,14 @@ static void every_node_does_what_the_table_says(void)
 /** The table has every control node and decorator that asks no script and is not the user's own. */
 static void the_table_is_complete(void)
 {
-    static const bool elsewhere[CANOPY_NODE_TYPES] = {
-        [CANOPY_NODE_PRECONDITION] = true,     [CANOPY_NODE_ATTRIBUTES] = true,
-        [CANOPY_NODE_SKIP_UNLESS_UPDATED] = true, [CANOPY_NODE_WAIT_VALUE_UPDATE] = true,
-        [CANOPY_NODE_LOOP] = true,             [CANOPY_NODE_SWITCH] = true,
-        [CANOPY_NODE_USER_CONTROL] = true,     [CANOPY_NODE_USER_DECORATOR] = true};
+    static const bool elsewhere[CANOPY_NODE_TYPES] = {[CANOPY_NODE_PRECONDITION] = true,
+                                                      [CANOPY_NODE_ATTRIBUTES] = true,
+                                                      [CANOPY_NODE_SKIP_UNLESS_UPDATED] = true,
+                                                      [CANOPY_NODE_WAIT_VALUE_UPDATE] = true,
+                                                      [CANOPY_NODE_LOOP] = true,
+                                                      [CANOPY_NODE_SWITCH] = true,
+                                                      [CANOPY_NODE_USER_CONTROL] = true,
+                                                      [CANOPY_NODE_USER_DECORATOR] = true};
     static const bool is_leaf[CANOPY_NODE_TYPES] = {
 #define LEAF true
 #define CONTROL false
