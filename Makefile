@@ -2,6 +2,7 @@
 # A few lines over CMakePresets.json and a Python environment in build/venv. `make help` lists the targets.
 MAKEFLAGS += --no-print-directory
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+export PYTHON3
 export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
 PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
@@ -22,14 +23,14 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test
+	$(SETUP)/make-venv can,lcm,test,differential
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
 	$(call BUILD,host)
 	ctest --preset host
 
-test-firmware: # the same tests on QEMU's Cortex-M4, and the sizes for Cortex-M0+ and Cortex-M4
+test-firmware: # the same tests as firmware in QEMU, and the sizes of the code for Cortex-M0+ and Cortex-M4
 	$(call BUILD,firmware-m0plus)
 	$(call BUILD,firmware-m4)
 	ctest --preset firmware-m0plus
@@ -45,28 +46,32 @@ test-rig: # integration tests on vcan0: one guest for all of them
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,lint
+	$(SETUP)/make-venv can,lcm,test,differential,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,lint
+	$(SETUP)/make-venv can,lcm,test,differential,lint
 	$(SETUP)/lint --fix
 
-check-all: ## what takes longer: clang, and the sanitizers under every test that needs no CAN interface
+check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
-	$(SETUP)/make-venv can,lcm,test
-	@$(MAKE) test-clang test-asan
+	$(SETUP)/make-venv can,lcm,test,differential
+	@$(MAKE) test-clang test-differential test-asan
 
 test-clang:
 	$(call BUILD,clang)
 	ctest --preset clang
 
+test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed each time
+	$(call BUILD,host)
+	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
+
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
-	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration tests/differential
 
 clean: ## remove everything that was built
 	rm -rf build

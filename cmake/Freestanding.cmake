@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# canopy_check_freestanding(TARGET): the build fails unless the static library TARGET could run on bare metal and owns no
-# memory: no allocator, no stdio, no floating-point helper, no other foreign symbol, .data and .bss empty.
+# canopy_check_freestanding(TARGET): the build fails unless the static library TARGET could run on bare metal and owns
+# no memory: no allocator, no stdio, no floating-point helper, no other foreign symbol, .data and .bss empty.
 # CheckFreestanding.cmake has the rules. Not done with CANOPY_SANITIZE: sanitizers add symbols and data of their own.
 function(canopy_check_freestanding TARGET)
     if(CANOPY_SANITIZE)

@@ -127,6 +127,16 @@ static void reactive_parallel_minus_one_means_all(void)
     EXPECT("SSK", CANOPY_SUCCESS, "abc");
 }
 
+static void reactive_parallel_needs_at_least_one_success(void)
+{
+    static const int32_t all_but_one = -2;
+
+    start_parallel(&all_but_one);
+    EXPECT("SSF", CANOPY_SUCCESS, "abc");
+    EXPECT("KKF", CANOPY_FAILURE, "abc");
+    EXPECT("KKS", CANOPY_SUCCESS, "abc");
+}
+
 static void sequence_with_memory_goes_on_where_it_failed_or_was_halted(void)
 {
     start_three_actions(CANOPY_NODE_SEQUENCE_WITH_MEMORY);
@@ -341,6 +351,7 @@ int main(void)
     RUN_TEST(a_halted_child_is_started_anew);
     RUN_TEST(reactive_parallel_counts_all_children_every_tick);
     RUN_TEST(reactive_parallel_minus_one_means_all);
+    RUN_TEST(reactive_parallel_needs_at_least_one_success);
     RUN_TEST(sequence_with_memory_goes_on_where_it_failed_or_was_halted);
     RUN_TEST(async_sequence_ends_the_tick_after_a_child_that_completed_at_once);
     RUN_TEST(async_fallback_is_its_mirror_image);

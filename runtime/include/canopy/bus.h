@@ -4,7 +4,7 @@
  * The application's side of the CAN bus: frames into the input image, the output image into frames.
  *
  * `canopy compile` makes the constant tables here from the DBC. A frame is checked from the outside in (arbitration id,
- * flags, length, CRC, counter, ranges of the values); one that fails changes nothing but a counter.
+ * flags, length, CRC, counter, ranges of the values); one that fails changes nothing that a leaf can see, but a counter.
  *
  * Threads: the loop's thread only.
  */

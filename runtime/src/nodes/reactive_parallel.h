@@ -3,7 +3,7 @@
  * @file
  * ReactiveParallel: the paper's Parallel (Algorithm 3). All N children are ticked in every tick, then counted.
  *
- * M = success_count; a negative one counts from N + 1 down (-1: all). A SKIPPED child is taken off N.
+ * M = success_count, at least 1; a negative one counts from N + 1 down (-1: all). A SKIPPED child is taken off N.
  * SUCCESS with at least M successes; FAILURE with more than N - M failures; else RUNNING. No state.
  */
 #ifndef CANOPY_NODES_REACTIVE_PARALLEL_H
@@ -33,6 +33,7 @@ static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree
     }
     children -= counts[CANOPY_SKIPPED];
     needed = canopy_threshold(canopy_parameter(self, node, 0), children);
+    needed = needed > 1 ? needed : 1;
     if (counts[CANOPY_SUCCESS] >= needed) {
         return CANOPY_SUCCESS;
     }
