@@ -137,10 +137,10 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
     }
     for (uint16_t index = 0; index < tree->node_count; index++) {
         const canopy_node_t *node = &tree->nodes[index];
-        bool ends_well = index == 0u ? node->parent == 0u && node->end == tree->node_count
-                                     : node->end > index && node->end <= tree->node_count && node->parent < index;
 
-        if (!ends_well || node->type >= (uint8_t)CANOPY_NODE_TYPES || !words_fit(tree, node, &words_end) ||
+        /* Only the root's place is looked at here: every later node is a child of one that children_fit() accepted. */
+        if ((index == 0u && (node->parent != 0u || node->end != tree->node_count)) ||
+            node->type >= (uint8_t)CANOPY_NODE_TYPES || !words_fit(tree, node, &words_end) ||
             !fields_fit(tree, node, &shapes[node->type]) || !children_fit(tree, index, &shapes[node->type])) {
             if (bad_node != NULL) {
                 *bad_node = index;
