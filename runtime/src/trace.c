@@ -119,7 +119,7 @@ static void send_health(const canopy_trace_config_t *config, canopy_trace_state_
 
     put16(&data[0], at_most16(canopy_bus_rejected(counters)));
     put16(&data[2], at_most16(counters->unknown_id));
-    put16(&data[4], at_most16(counters->tx_dropped + self->tx_dropped));
+    put16(&data[4], at_most16(canopy_sum(counters->tx_dropped, self->tx_dropped)));
     put16(&data[6], at_most16(tree->faults));
     send(self, can, config->health, data);
 }
