@@ -137,6 +137,8 @@ static void parameters_that_mean_nothing_are_refused(void)
     REFUSED(3, tables.parameters[0] = SCRIPTS_MAX);
     REFUSED(3, tables.parameters[0] = -2);
     REFUSED(3, tables.scripts[0] = NULL);
+    REFUSED(3, (tables.tree.script_count = 0, tables.tree.scripts = NULL));
+    REFUSED(3, (tables.tree.parameter_count = 0, tables.tree.parameters = NULL));
     REFUSED(5, tables.parameters[9] = CANOPY_IDLE);
     REFUSED(5, tables.parameters[9] = CANOPY_SKIPPED + 1);
     REFUSED(5, tables.parameters[8] = -1);
@@ -198,6 +200,20 @@ static void init_refuses_what_it_cannot_use(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &tables.tree, status, words, NULL));
     tables.tree.nodes = NULL;
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &tables.tree, status, words, NULL));
+}
+
+static void the_good_tables_tick(void)
+{
+    canopy_tree_instance_t instance;
+    uint8_t status[TABLE_NODES];
+    uint16_t words[TABLE_WORDS];
+    script_t log = {.returns = {CANOPY_SUCCESS}};
+
+    tables.parameters[0] = -1; /* no _failureIf */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&instance, &tables.tree, status, words, &log));
+    TEST_ASSERT_EQUAL(CANOPY_FAILURE, canopy_tree_tick(&instance, 0)); /* the Switch's second case */
+    TEST_ASSERT_EQUAL_STRING("aaa", log.log);
+    TEST_ASSERT_EQUAL_UINT32(0, instance.faults);
 }
 
 /* --- tables that were never validated ------------------------------------------------------------------------------ */
@@ -287,6 +303,7 @@ int main(void)
     RUN_TEST(what_is_no_tree_is_refused);
     RUN_TEST(tables_that_are_not_needed_may_be_missing);
     RUN_TEST(init_refuses_what_it_cannot_use);
+    RUN_TEST(the_good_tables_tick);
     RUN_TEST(a_leaf_that_has_children_is_a_fault);
     RUN_TEST(a_type_that_does_not_exist_is_a_fault);
     RUN_TEST(every_type_can_be_halted);
