@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Coverage of runtime/ out of clang's counters; fails below 100 % of regions (lines, and parts of
-lines that run by themselves), branches and conditions (MC/DC).
+"""Coverage of runtime/ out of clang's counters; fails below 100 % of regions, branches and conditions (MC/DC).
+
+A region is what clang counts for lines: a line, or a part of one that is run or not by itself.
 
 usage: report.py BUILD_FOLDER SOURCE_FOLDER
 
@@ -32,7 +33,7 @@ def export(build: Path, source: Path) -> Any:
     merged = build / "coverage.profdata"
     profiles = sorted(map(str, (build / "profiles").glob("*.profraw")))
     if not profiles:
-        sys.exit(f"{build}/profiles holds no counters: run the tests with LLVM_PROFILE_FILE={build}/profiles/%m-%p.profraw")
+        sys.exit(f"{build}/profiles holds no counters; `make coverage` runs the tests so that they leave some there")
     subprocess.run([f"llvm-profdata-{VERSION}", "merge", "-o", str(merged), *profiles], check=True)
     programs = [path for path in sorted((build / "tests" / "unit").glob("test_*")) if os.access(path, os.X_OK)]
     first, *others = [str(path) for path in programs if path.is_file()]
