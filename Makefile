@@ -10,7 +10,7 @@ SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
-.PHONY: help demo test lint format check-all clean test-host test-firmware test-python test-rig test-clang test-asan
+.PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
 .PHONY: coverage fuzz test-portable
 .NOTPARALLEL:
 
@@ -25,7 +25,7 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test,differential
+	$(SETUP)/make-venv can,lcm,test,differential,bench
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
@@ -48,13 +48,13 @@ test-rig: # integration tests on vcan0: one guest for all of them
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,differential,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,differential,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(SETUP)/lint --fix
 
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
@@ -96,6 +96,11 @@ fuzz: ## libFuzzer on tables, states, frames and traces, FUZZ_SECONDS=60 in all
 	$(SETUP)/make-venv can,test
 	$(call BUILD,fuzz)
 	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
+
+bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
+	$(SETUP)/ensure-packages bench
+	$(SETUP)/make-venv can,lcm,test,differential,bench
+	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md
 
 clean: ## remove everything that was built
 	rm -rf build

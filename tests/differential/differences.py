@@ -21,7 +21,7 @@ RULES: dict[str, str] = {
     "keep running": "KeepRunningUntilFailure turns a SKIPPED child into RUNNING",
     "same tick": "Repeat and RetryUntilSuccessful begin the next cycle in the tick that ends an asynchronous one",
     "memory yields": "SequenceWithMemory yields after every child that completes in the tick it was started in",
-    "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there: its parent's reset halts it, count 0",
+    "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there, and loses its count at other times",
     "skipped action": "a RUNNING action that answers SKIPPED stays RUNNING there",
     "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped then",
 }
@@ -117,6 +117,11 @@ class AsyncSequence(InOrder, model.AsyncSequence):
 
 
 class SequenceWithMemory(InOrder, model.SequenceWithMemory):
+    def ended_by(self, status: int) -> int:
+        for child in self.children[self.index :]:
+            child.reset()
+        return status
+
     def yields_now(self) -> bool:
         self.world.differs("memory yields")
         return True
@@ -161,11 +166,18 @@ class ReactiveFallback(Reactive, model.ReactiveFallback):
     pass
 
 
-class Parallel(BtCppNode, model.Parallel):
+class Remembering(BtCppNode, model.Remembering):
+    """One that is SKIPPED does not reset its children. This is only shown."""
+
+    def complete(self, status: int) -> int:
+        return status if status == SKIPPED else super().complete(status)
+
+
+class Parallel(Remembering, model.Parallel):
     pass
 
 
-class ParallelAll(BtCppNode, model.ParallelAll):
+class ParallelAll(Remembering, model.ParallelAll):
     pass
 
 
@@ -197,9 +209,12 @@ class WhileDoElse(BtCppNode, model.WhileDoElse):
 
 class Decorator(BtCppNode, model.Decorator):
     def tick_child(self) -> int:
-        status = self.children[0].tick()
+        child = self.children[0]
+        status = child.tick()
         if status in COMPLETED:
             self.reset_all()
+        elif status == SKIPPED and isinstance(child, Counting) and child.cycles:
+            self.world.differs("skipped count")
         return status
 
 
@@ -311,7 +326,7 @@ def shown_alike(tree: Tree, ours: Outcome, theirs: Outcome) -> bool:
     """Whether the engine and BehaviorTree.CPP show the same statuses after a tick, but for how it shows them.
 
     The differences that only are shown: it resets a completed root; it does not store SKIPPED; a reactive node resets
-    what it has ticked before the RUNNING child; a two-child IfThenElse does not reset its condition after a FAILURE.
+    what it has ticked before the RUNNING child; a SequenceWithMemory that fails does not reset the children before; a two-child IfThenElse does not reset its condition after a FAILURE.
     """
     parents: list[Spec | None] = []
     specs: list[Spec] = []
@@ -340,6 +355,8 @@ def _alike(spec: Spec, parent: Spec | None, ours: int, theirs: int) -> bool:
         return False
     if parent.kind in ("ReactiveSequence", "ReactiveFallback"):
         return ours in (SUCCESS, FAILURE) and theirs == IDLE
+    if parent.kind == "SequenceWithMemory":
+        return ours == WAS + theirs
     if parent.kind == "IfThenElse" and len(parent.children) == 2 and spec is parent.children[0]:
         return ours == WAS + FAILURE and theirs == FAILURE
     return False

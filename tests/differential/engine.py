@@ -57,8 +57,7 @@ class _Packer:
         elif spec.parameters:
             parameter = len(self.parameters)
             values = dict(zip(SHAPES[spec.kind].parameters, spec.parameters, strict=True))
-            # nodes.def has "name=default" or "name"; several parameters stand in this order.
-            self.parameters += [values.pop(entry.partition("=")[0]) for entry in kind.parameter.split()]
+            self.parameters += [values.pop(entry.name) for entry in kind.parameters]
             assert not values, f"nodes.def knows no parameter {values} of {spec.kind}"
         below = b"".join(self._rows(child, number) for child in spec.children)
         return _NODE.pack(kind.number, 0, parent, self.count, state, leaf, parameter) + below

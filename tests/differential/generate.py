@@ -178,7 +178,7 @@ class Generator:
             # For ever only over what can yield (rule 8).
             yields = any(spec.kind == "StatefulAction" for child in children for spec in child.walk())
             return rng.choice((-1, -1, 0, 1, 2, 3, 5) if yields else (0, 1, 2, 3, 5))
-        if name in ("then_skip", "catch_on_halt"):
+        if name == "then_skip":
             return rng.randint(0, 1)
         if name in ("msec", "delay_msec"):
             return rng.choice(_MSEC)

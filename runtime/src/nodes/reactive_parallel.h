@@ -17,7 +17,7 @@ static inline canopy_step_t canopy_reactive_parallel_enter(uint16_t node)
 }
 
 /** Algorithm 3's verdict over children that have all been ticked. */
-static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree_instance_t *self, uint16_t node)
+static CANOPY_SELDOM canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree_instance_t *self, uint16_t node)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     int32_t counts[CANOPY_SKIPPED + 1] = {0};
@@ -40,7 +40,8 @@ static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree
     return counts[CANOPY_FAILURE] > children - needed ? CANOPY_FAILURE : CANOPY_RUNNING;
 }
 
-static inline canopy_step_t canopy_reactive_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child)
+static CANOPY_SELDOM canopy_step_t canopy_reactive_parallel_child(canopy_tree_instance_t *self, uint16_t node,
+                                                                  uint16_t child)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     canopy_status_t verdict;

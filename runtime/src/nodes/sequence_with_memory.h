@@ -17,16 +17,16 @@ static inline canopy_step_t canopy_sequence_with_memory_enter(canopy_tree_instan
     return child != 0u ? child : node + 1u;
 }
 
-static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
-                                                              uint16_t child, canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
+                                                                     uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
-    bool all_skipped = true;
+    bool all_skipped;
 
     if (status == CANOPY_RUNNING || status == CANOPY_FAILURE) {
         *canopy_words(self, node) = child;
         if (status == CANOPY_FAILURE) {
-            (void)canopy_reset_children(self, node, child);
+            (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
         }
         return canopy_done(status);
     }
@@ -34,11 +34,7 @@ static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instan
         return nodes[child].end;
     }
     *canopy_words(self, node) = 0;
-    for (child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
-        /* A child before the place where a halt interrupted is IDLE; what it last returned still counts. */
-        all_skipped = all_skipped && (self->status[child] & ~CANOPY_STATUS_WAS) == (unsigned)CANOPY_SKIPPED;
-        canopy_reset_child(self, child);
-    }
+    all_skipped = canopy_reset_children(self, node, (uint16_t)(node + 1u));
     return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
 }
 

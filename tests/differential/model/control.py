@@ -64,8 +64,7 @@ class SequenceWithMemory(InOrder):
     keeps_index = True
 
     def ended_by(self, status: int) -> int:
-        for child in self.children[self.index :]:
-            child.reset()
+        self.reset_all()
         self.skipped = 0
         return status
 
@@ -150,7 +149,7 @@ class Parallel(Remembering):
                 return self.complete(SUCCESS)
             if failures >= too_many or len(self.children) - failures < enough:
                 return self.complete(FAILURE)
-        return SKIPPED if skipped == len(self.children) else RUNNING
+        return self.complete(SKIPPED) if skipped == len(self.children) else RUNNING
 
 
 class ParallelAll(Remembering):
@@ -164,7 +163,7 @@ class ParallelAll(Remembering):
                 elif status in COMPLETED:
                     self.done[index] = status
         if skipped == len(self.children):
-            return SKIPPED
+            return self.complete(SKIPPED)
         if skipped + len(self.done) < len(self.children):
             return RUNNING
         return self.complete(FAILURE if self.count(FAILURE) >= self.threshold(0) else SUCCESS)
@@ -262,10 +261,3 @@ class TryCatch(Node):
         self.reset_all()
         self.begin()
         return result
-
-    def on_halt(self) -> None:
-        if self.spec.parameters[0] and self.index < len(self.children):
-            for child in self.children[:-1]:
-                child.reset()
-            self.children[-1].tick()
-        super().on_halt()

@@ -45,6 +45,11 @@ class Counting(Decorator):
     def begin(self) -> None:
         self.cycles = 0
 
+    def reset(self) -> None:
+        """A node that is reset starts anew, also after SKIPPED."""
+        super().reset()
+        self.begin()
+
     def tick_children(self) -> int:
         wanted = self.spec.parameters[0]
         if wanted == 0:
@@ -78,6 +83,11 @@ class Delay(Decorator):
     def begin(self) -> None:
         self.deadline: int | None = None
         self.over = False
+
+    def reset(self) -> None:
+        """A node that is reset starts anew, also after SKIPPED."""
+        super().reset()
+        self.begin()
 
     def tick_children(self) -> int:
         if self.deadline is None:

@@ -60,10 +60,10 @@ class Node:
         return self.status
 
     def halt(self) -> None:
-        """Halt the tree: a RUNNING node is halted once, the children first; any other is not."""
+        """Halt the tree: children first. What a node keeps while RUNNING or through a SKIPPED child is forgotten."""
         self.calls = ""
         self.reset_all()
-        if self.status == "R":
+        if self.status in "RK":
             self.on_halt()
         self.status = "I"
         self.pass_time()
@@ -75,7 +75,7 @@ class Node:
 
     def state(self) -> tuple[object, ...]:
         """What a later tick depends on."""
-        return (self.status == "R", tuple(self.child_status), self.memory())
+        return (self.status if self.status in "RK" else "", tuple(self.child_status), self.memory())
 
     def run(self, child: int) -> str:
         """Tick a child."""
@@ -114,7 +114,8 @@ class Sequence(Node):
         self.skipped: frozenset[int] = frozenset()
 
     def on_halt(self) -> None:
-        """The place is kept by a node with memory."""
+        """The place is kept by a node with memory; what was skipped before it, by none."""
+        self.skipped = frozenset()
         if not self.keeps_index:
             self.forget()
 
@@ -132,8 +133,7 @@ class Sequence(Node):
             if status == "K":
                 self.skipped |= {self.index}
             elif status != self.go_on:
-                if not self.keeps_index:
-                    self.forget()
+                self.on_halt()
                 return status
             self.index += 1
             if status == self.go_on and self.yields and started_now and self.index < self.children:
@@ -214,14 +214,12 @@ class Parallel(Node):
             if self.child_status[child] in "SF":
                 continue
             skipped += self.run(child) == "K"
-            if skipped == self.children:
-                return "K"
             successes, failures = self.child_status.count("S"), self.child_status.count("F")
             if successes + (skipped if self.parameters[0] < 0 else 0) >= success_count:
                 return "S"
             if failures >= failure_count or self.children - failures < success_count:
                 return "F"
-        return "R"
+        return "K" if skipped == self.children else "R"
 
 
 class ParallelAll(Node):
