@@ -7,9 +7,11 @@ export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
 PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
 SETUP := host_tools/setup
+FUZZ_SECONDS ?= 60
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
+.PHONY: coverage fuzz test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -58,11 +60,27 @@ format: ## let clang-format and ruff rewrite the sources
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,test,differential
-	@$(MAKE) test-clang test-differential test-asan
+	@$(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
 
 test-clang:
 	$(call BUILD,clang)
 	ctest --preset clang
+
+test-portable: # 32 bit, big-endian, and clang's sanitizers: the unit tests
+	$(call BUILD,i686)
+	ctest --preset i686
+	$(call BUILD,powerpc)
+	ctest --preset powerpc
+	$(call BUILD,asan-clang)
+	ctest --preset asan-clang
+
+coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fails below 100 %
+	$(SETUP)/ensure-packages coverage
+	$(SETUP)/make-venv can,lcm,test
+	$(call BUILD,coverage)
+	rm -rf build/coverage/profiles
+	LLVM_PROFILE_FILE=$(CURDIR)/build/coverage/profiles/%m-%p.profraw ctest --preset coverage
+	$(PYTHON) tests/coverage/report.py build/coverage runtime
 
 test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed each time
 	$(call BUILD,host)
@@ -72,6 +90,12 @@ test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
 	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration tests/differential
+
+fuzz: ## libFuzzer on tables, states, frames and traces, FUZZ_SECONDS=60 in all
+	$(SETUP)/ensure-packages fuzz
+	$(SETUP)/make-venv can,test
+	$(call BUILD,fuzz)
+	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
 
 bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench

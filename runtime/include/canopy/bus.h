@@ -92,6 +92,12 @@ typedef struct {
     canopy_bus_counters_t counters;
 } canopy_bus_state_t;
 
+/** The sum, or the largest value where that is less. */
+static inline uint32_t canopy_sum(uint32_t a, uint32_t b)
+{
+    return a <= UINT32_MAX - b ? a + b : UINT32_MAX;
+}
+
 /** Adds one, and stays at the largest value instead of starting again at 0. */
 static inline void canopy_count(uint32_t *counter)
 {
