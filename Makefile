@@ -11,7 +11,7 @@ FUZZ_SECONDS ?= 60
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage fuzz test-portable
+.PHONY: coverage fuzz proof test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -96,6 +96,10 @@ fuzz: ## libFuzzer on tables, states, frames and traces, FUZZ_SECONDS=60 in all
 	$(SETUP)/make-venv can,test
 	$(call BUILD,fuzz)
 	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
+
+proof: ## Frama-C on the ring and the E2E check: no undefined behaviour for any input (installs 1.1 GB)
+	$(SETUP)/ensure-packages proof
+	tests/proof/run
 
 bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench

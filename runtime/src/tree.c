@@ -65,7 +65,7 @@ static CANOPY_SELDOM canopy_step_t enter(canopy_tree_instance_t *self, canopy_in
 {
     uint16_t node = (uint16_t)index;
 
-    switch ((canopy_node_type_t)self->tree->nodes[node].type) {
+    switch ((canopy_node_type_t)self->tree->nodes[node].type) { /* not covered: no other value */
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
         return canopy_leaf_enter(self, node);
@@ -126,14 +126,14 @@ static CANOPY_SELDOM canopy_step_t enter(canopy_tree_instance_t *self, canopy_in
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_enter(self, node);
-    case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-    case CANOPY_NODE_REACTIVE_FALLBACK:
-    case CANOPY_NODE_TYPES:
+    case CANOPY_NODE_SEQUENCE:          /* not covered: the tick enters these itself */
+    case CANOPY_NODE_FALLBACK:          /* not covered: the tick enters these itself */
+    case CANOPY_NODE_REACTIVE_SEQUENCE: /* not covered: the tick enters these itself */
+    case CANOPY_NODE_REACTIVE_FALLBACK: /* not covered: the tick enters these itself */
+    case CANOPY_NODE_TYPES:             /* not covered: no type */
         break;
     }
-    return canopy_done(canopy_leaf_fault(self, node));
+    return canopy_done(canopy_leaf_fault(self, node)); /* not covered: refused */
 }
 
 /** A child of this node has returned; those of nodes/sequence.h are told by the tick itself. */
@@ -143,7 +143,7 @@ static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, cano
     uint16_t node = (uint16_t)parent;
     uint16_t child = (uint16_t)index;
 
-    switch ((canopy_node_type_t)self->tree->nodes[node].type) {
+    switch ((canopy_node_type_t)self->tree->nodes[node].type) { /* not covered: no other value */
     case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
         return canopy_sequence_with_memory_child(self, node, child, status);
     case CANOPY_NODE_ASYNC_SEQUENCE:
@@ -191,10 +191,10 @@ static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, cano
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_child(self, node, child, status);
-    case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-    case CANOPY_NODE_REACTIVE_FALLBACK:
+    case CANOPY_NODE_SEQUENCE:          /* not covered: told by the tick itself */
+    case CANOPY_NODE_FALLBACK:          /* not covered: told by the tick itself */
+    case CANOPY_NODE_REACTIVE_SEQUENCE: /* not covered: told by the tick itself */
+    case CANOPY_NODE_REACTIVE_FALLBACK: /* not covered: told by the tick itself */
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
     case CANOPY_NODE_STATEFUL_ACTION:
@@ -202,7 +202,7 @@ static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, cano
     case CANOPY_NODE_ALWAYS_FAILURE:
     case CANOPY_NODE_SLEEP:
     case CANOPY_NODE_WAS_ENTRY_UPDATED:
-    case CANOPY_NODE_TYPES:
+    case CANOPY_NODE_TYPES: /* not covered: no type */
         break;
     }
     return canopy_done(canopy_leaf_fault(self, node));
