@@ -37,6 +37,12 @@ static inline int64_t canopy_limit_unsigned(uint64_t value, uint32_t *faults)
     return (int64_t)value;
 }
 
+/** @return ~value */
+static inline int64_t canopy_complement(int64_t value)
+{
+    return ~value;
+}
+
 /** @return a + b, saturated */
 static inline int64_t canopy_add(int64_t a, int64_t b, uint32_t *faults)
 {

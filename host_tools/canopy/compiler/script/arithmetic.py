@@ -113,7 +113,10 @@ class Arithmetic:
         whole = self._whole(value, index, "~")
         if isinstance(whole, Const):
             return Const(Fraction(~int(whole.value)))
-        return result(f"(~{whole.as_type(whole.wide)})", ~whole.high, ~whole.low, Fraction(1))
+        # A function: gcc warns of a comparison with ~x when x was unsigned, whatever it was cast to.
+        c = f"canopy_complement({whole.as_type(True)})"
+        c = c if whole.wide else f"(int32_t){c}"
+        return result(c, ~whole.high, ~whole.low, Fraction(1))
 
     def binary(self, sign: str, left: Value, right: Value, index: int) -> Value:
         """Arithmetic and bits."""
@@ -246,6 +249,8 @@ class Arithmetic:
         scale = common_scale(left.scale, right.scale)
         first, second = self.scaled(left, scale, index), self.scaled(right, scale, index)
         wide = first.wide or second.wide
+        if first.c == second.c:  # C compilers warn of a number compared with itself
+            return Const(Fraction(_COMPARE[sign](0, 0)), is_bool=True)
         return boolean(f"({_operand(first, wide)} {sign} {_operand(second, wide)})")
 
     def _compare_constant(self, sign: str, left: Num, right: Const, index: int) -> Num | Const:
