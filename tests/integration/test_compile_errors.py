@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """`canopy compile` on inputs that cannot be compiled: exit status 2, a message that names the place and the way out, and
-not a single file written."""
+not a single file written.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from canopy.cli import main
 from click.testing import CliRunner, Result
+
+from canopy.cli import main
 
 NAO = Path(__file__).parents[2] / "examples" / "nao"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scripts: random expressions, compiled to C and run, against exact arithmetic in Python; and undefined behaviour traps."""
+"""Scripts: random expressions, compiled to C and run, against exact arithmetic in Python. Undefined behaviour traps."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+
 from canopy.cli import main
 from canopy.compiler.blackboard import Blackboard, Entry, Use
 from canopy.compiler.bus_reader import read_bus
@@ -22,7 +24,6 @@ from canopy.compiler.errors import Place
 from canopy.compiler.port_types import PORT_TYPES
 from canopy.compiler.script.compile import Compiler, Texts
 from canopy.compiler.script.syntax import ScriptError, parse
-from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "tests" / "unit" / "language" / "language.dbc"
@@ -38,10 +39,11 @@ SIGNAL = "Climate.Temperature"  # 16 bits, signed, 0.5 degC a bit, offset 10
 Values = dict[str, int]
 Meaning = Callable[[Values], Fraction]
 
-WARNINGS = (
-    "-Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wswitch-enum -Wdouble-promotion -Wcast-align "
-    "-Wmissing-prototypes -Wvla -Werror -Wno-tautological-compare"
-).split()  # random scripts do compare b * d with d * b
+# Random scripts do compare b * d with d * b.
+WARNINGS = [
+    *("-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wundef", "-Wswitch-enum", "-Wcast-align"),
+    *("-Wdouble-promotion", "-Wmissing-prototypes", "-Wvla", "-Werror", "-Wno-tautological-compare"),
+]
 
 
 def _saturated(value: Fraction) -> Fraction:

@@ -143,7 +143,7 @@ def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -
 
 
 def make_budget(table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> Budget:
-    """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (SEMANTICS, rule 3)."""
+    """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (rule 3)."""
     return Budget(
         ram_bytes=ram_bytes(table, bus),
         flash_bytes=flash_bytes(table, bus),

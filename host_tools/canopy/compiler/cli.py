@@ -14,6 +14,7 @@ from canopy.compiler.emit import load_application, render, write_files
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.port_types import Options
+from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
 
@@ -49,6 +50,7 @@ def _read_type_map(pairs: tuple[str, ...]) -> dict[str, str]:
 @click.option("--include", help="Header of yours with the state types of leaves, included by the generated files.")
 @click.option("--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double.")
 @click.option("--type-map", "type_map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type.")
+@click.option("--stubs", "stubs_file", type=click.Path(path_type=Path), help="Write skeletons of what you write.")
 @click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
 @click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
@@ -64,6 +66,7 @@ def command(
     include: str | None,
     floats: bool,
     type_map: tuple[str, ...],
+    stubs_file: Path | None,
     depfile: Path | None,
     bitrate: int,
     max_ram: int | None,
@@ -92,10 +95,15 @@ def command(
             click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
     try:
+        if stubs_file is not None:
+            write_stubs(stubs_file, stubs(application.name, application.table, application.bus))
         write_files(output, files)
         if depfile is not None:
             read = [str(file.resolve()) for file in (*application.table.tree.files, dbc)]
             depfile.write_text(f"{output / application.name}_app.c: {' '.join(read)}\n".replace("\\", "/"))
+    except CompileError as error:
+        click.echo(str(error), err=True)
+        sys.exit(INPUT_ERROR)
     except OSError as error:
         click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
         sys.exit(INPUT_ERROR)

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import difflib
 import html
 import re
 from dataclasses import dataclass, field
 from typing import Literal
 
-from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
 
 Kind = Literal["bool", "int", "duration", "float", "text", "user", "any"]
@@ -116,8 +117,9 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
             f"{where}: unsupported type '{name}'",
             f"give the C type of yours that stands for it: --type-map '{normal}=my_type_t'",
         )
-    if normal not in mapped.values() and "did you mean" in nearest(normal, [n for n in PORT_TYPES if n]):
-        raise CompileError(place, f"{where}: unsupported type '{name}'", nearest(normal, [n for n in PORT_TYPES if n]))
+    close = difflib.get_close_matches(normal, [n for n in PORT_TYPES if n], n=1, cutoff=0.85)
+    if normal not in mapped.values() and close:
+        raise CompileError(place, f"{where}: unsupported type '{name}'", f"did you mean '{close[0]}'?")
     if options.include is None:
         raise CompileError(
             place,
