@@ -302,3 +302,88 @@ def test_floating_point_only_where_it_is_allowed(tmp_path: Path) -> None:
     text = (tmp_path / "out" / "main_app.c").read_text()
     assert "canopy_divide(app->entries.x, (double)app->entries.n" in text
     assert (tmp_path / "out" / "main_app.h").read_text().count("    double ") == 2
+
+
+GROOT = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<root BTCPP_format="4"
+      main_tree_to_execute="Navigate">
+  <BehaviorTree ID="Navigate">
+    <RecoveryNode name="NavigateRecovery"
+                  number_of_retries="6">
+      <PipelineSequence name="NavigateWithReplanning">
+        <RateController hz="1">
+          <RecoveryNode number_of_retries="1" name="ComputePathToPose">
+            <ComputePathToPose goal="{goal}" path="{path}" planner_id="GridBased" error_code_id="{compute_path_error_code}"/>
+            <ClearEntireCostmap name="ClearGlobalCostmap" service_name="global_costmap/clear"/>
+          </RecoveryNode>
+        </RateController>
+        <FollowPath path="{path}" controller_id="FollowPath" error_code_id="" speed=""/>
+      </PipelineSequence>
+      <ReactiveFallback name="RecoveryFallback">
+        <GoalUpdated/>
+        <SubTree ID="Recover" _autoremap="true" goal="{goal}"/>
+      </ReactiveFallback>
+    </RecoveryNode>
+  </BehaviorTree>
+
+  <BehaviorTree ID="Recover">
+    <RoundRobin name="RecoveryActions">
+      <ClearEntireCostmap service_name="local_costmap/clear"/>
+      <Spin spin_dist="157"/>
+      <Sleep name="Wait" msec="5000"/>
+    </RoundRobin>
+  </BehaviorTree>
+
+  <!-- Description of Node Models (used by Groot) -->
+  <TreeNodesModel>
+    <Control ID="RecoveryNode" editable="true"><input_port name="number_of_retries" type="int"/></Control>
+    <Control ID="PipelineSequence" editable="true"/>
+    <Control ID="RoundRobin" editable="true"/>
+    <Decorator ID="RateController" editable="true"><input_port name="hz" type="int" default=""/></Decorator>
+    <Condition ID="GoalUpdated" editable="true"/>
+    <Action ID="ComputePathToPose" editable="true">
+      <input_port name="goal" type="geometry_msgs::msg::PoseStamped_&lt;std::allocator&lt;void&gt; &gt;"/>
+      <output_port name="path" type="nav_msgs::msg::Path_&lt;std::allocator&lt;void&gt; &gt;">Path found</output_port>
+      <input_port name="planner_id" type="std::string"/>
+      <output_port name="error_code_id" type="unsigned short"/>
+    </Action>
+    <Action ID="FollowPath" editable="true">
+      <input_port name="path" type="nav_msgs::msg::Path_&lt;std::allocator&lt;void&gt; &gt;"/>
+      <input_port name="controller_id" type="std::string" default=""/>
+      <input_port name="speed" type="unsigned int" default="3"/>
+      <output_port name="error_code_id" type="unsigned short"/>
+    </Action>
+    <Action ID="ClearEntireCostmap" editable="true"><input_port name="service_name" type="std::string"/></Action>
+    <Action ID="Spin" editable="true"><input_port name="spin_dist" type="int">cm</input_port></Action>
+    <Action ID="Sleep" editable="true"><input_port name="msec" type="unsigned int"/></Action>
+    <SubTree ID="Navigate" editable="true">
+      <input_port name="goal" type="geometry_msgs::msg::PoseStamped_&lt;std::allocator&lt;void&gt; &gt;"/>
+    </SubTree>
+    <SubTree ID="Recover" editable="true"><input_port name="goal"/></SubTree>
+  </TreeNodesModel>
+</root>
+"""
+
+
+def test_a_tree_as_an_editor_saves_it_compiles_and_links_with_its_stubs(tmp_path: Path) -> None:
+    (tmp_path / "types.h").write_text(
+        "#pragma once\ntypedef struct { int x; } path_t;\ntypedef struct { int x; } pose_t;\n"
+    )
+    types = [
+        *("--type-map", "nav_msgs::msg::Path_<std::allocator<void>>=path_t"),
+        *("--type-map", "geometry_msgs::msg::PoseStamped_<std::allocator<void>>=pose_t"),
+    ]
+    stubs = tmp_path / "nodes.c"
+    result = compile_files(tmp_path, {"main.xml": GROOT}, *types, "--include", "types.h", "--stubs", str(stubs))
+    assert result.exit_code == 0, result.output
+    program = tmp_path / "program.c"
+    program.write_text(
+        '#include <stddef.h>\n#include "main_app.h"\nint main(void) { return canopy_tree_validate(main_app.tree, NULL); }\n'
+    )
+    sources = [program, stubs, *(tmp_path / "out").glob("*.c"), *(ROOT / "runtime" / "src").glob("*.c")]
+    include = ["-I", str(ROOT / "runtime" / "include"), "-I", str(tmp_path / "out"), "-I", str(tmp_path)]
+    subprocess.run(
+        ["gcc", "-std=c11", *WARNINGS, *include, *map(str, sources), "-o", str(tmp_path / "program")], check=True
+    )
+    subprocess.run([str(tmp_path / "program")], check=True)

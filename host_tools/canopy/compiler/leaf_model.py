@@ -103,10 +103,13 @@ def _read_port(element: Element, options: Options) -> Port:
     if not is_c_identifier(snake(name)) or not name:
         raise CompileError(element.place, f"<{element.tag}> needs a name that can be a C identifier, not '{name}'")
     kind = read_type(element.attributes.get("type", ""), f"port '{name}'", element.place, options)
+    default = element.attributes.get("default")
+    if default == "" and kind.kind != "text":
+        default = None  # Groot2 writes an empty default where there is none
     return Port(
         name,
         kind,
-        element.attributes.get("default"),
+        default,
         element.text.strip(),
         element.place,
         PORT_TAGS[element.tag],

@@ -243,11 +243,12 @@ class _Builder:
         return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
 
     def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
-        given = port.name in element.attributes
-        text = element.attributes.get(port.name, port.default)
+        # Groot2 writes an empty attribute for a port that nothing is connected to.
+        given = port.name in element.attributes and (element.attributes[port.name] != "" or port.type.kind == "text")
+        text = element.attributes[port.name] if given else port.default
         place = element.attribute_place(port.name) if given else element.place
         if text is None:
-            if port.writes:
+            if port.direction == "out":
                 return Bound(port, place)
             raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
         name = pointer(text, port.name)
