@@ -162,6 +162,24 @@ static void a_loop_takes_one_item_a_tick(void)
     }
 }
 
+static void a_loop_takes_the_items_of_an_entry(void)
+{
+    static const int32_t sums[] = {5, 75, 975, 975};
+
+    for (unsigned tick = 0; tick < 4; tick++) {
+        cycle();
+        TEST_ASSERT_EQUAL_INT32(sums[tick], language_entries->queue_sum);
+        TEST_ASSERT_EQUAL_UINT16(tick < 3u ? 2u - tick : 0u, language_entries->queue.count);
+    }
+    /* A count beyond the capacity is limited, and counted. */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    cycle();
+    language_entries->queue.count = 9;
+    cycle();
+    TEST_ASSERT_EQUAL_UINT16(2, language_entries->queue.count);
+    TEST_ASSERT_EQUAL_UINT32(1, language_entries->script_faults);
+}
+
 static void updates_are_counted_where_a_node_waits_for_them(void)
 {
     cycle();
@@ -206,6 +224,7 @@ int main(void)
     RUN_TEST(a_switch_takes_the_case_that_matches);
     RUN_TEST(texts_are_places_in_a_table);
     RUN_TEST(a_loop_takes_one_item_a_tick);
+    RUN_TEST(a_loop_takes_the_items_of_an_entry);
     RUN_TEST(updates_are_counted_where_a_node_waits_for_them);
     RUN_TEST(control_nodes_and_decorators_of_the_users_own);
     RUN_TEST(nothing_was_limited);

@@ -99,7 +99,9 @@ def _entries(table: Table) -> tuple[int, int]:
     """The blackboard. Entries of the user's own types are not counted."""
     members = []
     for entry in table.bindings.entries:
-        if entry.type.kind != "user":
+        if entry.type.capacity:
+            members.append(struct_size([scalar("uint16_t"), array(scalar(entry.type.item), entry.type.capacity)]))
+        elif entry.type.kind != "user":
             members.append(scalar(entry_type(entry)))
         if entry.counted:
             members.append(scalar("uint32_t"))

@@ -19,7 +19,7 @@ from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.leaf_c import arguments, entry_type, parameters, port_members, prototypes, setters, stale_test
 from canopy.compiler.names import is_c_identifier, snake
-from canopy.compiler.port_types import Options, c_string
+from canopy.compiler.port_types import Options, PortType, c_string
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
@@ -155,6 +155,13 @@ def _comment(text: str) -> str:
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
+def _queues(table: Table) -> list[PortType]:
+    """The types of queues, each once."""
+    kinds = [port.type for use in table.users for port in use.leaf.ports]
+    kinds += [entry.type for entry in table.bindings.entries]
+    return sorted({kind for kind in kinds if kind.capacity}, key=lambda kind: kind.c)
+
+
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
     return f"{Path(place.file).name}:{place.line}"
@@ -196,6 +203,7 @@ def render(application: Application) -> dict[str, str]:
         "version": __version__,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "queues": _queues(application.table),
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
     bus, name = application.bus.name, application.name

@@ -17,12 +17,17 @@ Kind = Literal["bool", "int", "duration", "float", "text", "user", "any"]
 
 @dataclass(frozen=True)
 class PortType:
-    """A type. `c` is the C type of an entry or port; `low` and `high` are the limits of whole numbers."""
+    """A type. `c` is the C type of an entry or port; `low` and `high` are the limits of whole numbers.
+
+    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items.
+    """
 
     kind: Kind
     c: str
     low: int = 0
     high: int = 0
+    item: str = ""
+    capacity: int = 0
 
     def __str__(self) -> str:
         return {"text": "a constant text", "duration": "a duration [ms]", "any": "any type"}.get(self.kind, self.c)
@@ -93,6 +98,16 @@ def _normal(name: str) -> str:
     return re.sub(r"\s+", " ", text.removeprefix("const ") if "*" not in text else text)
 
 
+_QUEUE = re.compile(r"(?P<item>[\w ]+?) ?\[(?P<capacity>\d{1,5})\]")
+MAX_CAPACITY = 65_535
+
+
+def _queue(item: PortType, capacity: int, where: str, place: Place) -> PortType:
+    if item.kind not in ("bool", "int", "float") or not 1 <= capacity <= MAX_CAPACITY:
+        raise CompileError(place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers", "for example type='int32_t[8]'")
+    return PortType("user", f"canopy_queue_{item.c.removesuffix('_t')}_{capacity}_t", item=item.c, capacity=capacity)
+
+
 def read_type(name: str, where: str, place: Place, options: Options) -> PortType:
     """The type of that name. `where` says whose it is, for messages.
 
@@ -111,6 +126,9 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
                 "use whole numbers of a smaller unit, or compile with --allow-floating-point",
             )
         return known
+    queue = _QUEUE.fullmatch(normal)
+    if queue is not None:
+        return _queue(read_type(queue["item"], where, place, options), int(queue["capacity"]), where, place)
     if not is_c_identifier(normal):
         raise CompileError(
             place,

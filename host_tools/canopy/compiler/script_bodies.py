@@ -6,7 +6,7 @@ from __future__ import annotations
 from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.port_types import TEXT, literal
-from canopy.compiler.script.compile import Compiler, Texts, guess, stripped
+from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess, stripped
 from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
 from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
 from canopy.compiler.tree import Script
@@ -87,7 +87,11 @@ class Bodies:
         return [*lines, f"return {len(cases)};"]
 
     def _take(self, compiler: Compiler, script: Script) -> list[str]:
-        assert isinstance(script.target, Entry) and script.type is not None and script.state is not None
+        assert isinstance(script.target, Entry)
+        assert script.type is not None
+        if script.queue is not None:
+            return self._take_from_entry(compiler, script, script.queue, script.target)
+        assert script.state is not None
         place = script.place()
         texts = [text.strip() for text in script.text.split(";") if text.strip()]
         if not texts:
@@ -109,6 +113,31 @@ class Bodies:
             "}",
             *compiler.store(script.target, f"items[{state}]"),
             f"{state}++;",
+            "return 1;",
+        ]
+
+    @staticmethod
+    def _take_from_entry(compiler: Compiler, script: Script, queue: Entry, target: Entry) -> list[str]:
+        assert script.type is not None
+        kind = queue.type
+        if kind.item != script.type.c:
+            raise ScriptError(
+                0,
+                f"entry '{queue.name}' is {kind}, and a queue of {script.type.c} is needed",
+                f"declare the port that fills it as type='{script.type.c}[8]'",
+            )
+        member = f"app->entries.{queue.c_name}"
+        return [
+            f"if ({member}.count == 0u) {{",
+            "    return 0;",
+            "}",
+            f"if ({member}.count > {kind.capacity}u) {{",
+            f"    canopy_script_fault({FAULTS});",
+            f"    {member}.count = {kind.capacity}u;",
+            "}",
+            *compiler.store(target, f"{member}.items[0]"),
+            f"{member}.count--;",
+            f"memmove(&{member}.items[0], &{member}.items[1], {member}.count * sizeof {member}.items[0]);",
             "return 1;",
         ]
 

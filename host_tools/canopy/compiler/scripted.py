@@ -150,14 +150,13 @@ def _loop(context: Context, element: Element, scope: Scope, xml_name: str) -> No
     script = context.script("take", element, "queue", scope)
     script.type = kind
     script.target = context.entry(element, "value", scope, f"<{xml_name} value>", writes=True, kind=kind)
-    if pointer(script.text, "queue") is not None:
-        raise CompileError(
-            script.place(), f"queue='{script.text}': queues in entries are not supported", 'give a list: queue="1;2;3"'
-        )
-    script.state = context.board.make(f"next item at line {element.place.line}", scope.path, element.place)
-    script.state.uses.append(Use(PORT_TYPES["uint16_t"], element.place, f"<{xml_name}>", True))
     node = _node("Loop", xml_name, element, (script, _status(element, "if_empty", "SUCCESS")))
     script.node = node
+    if pointer(script.text, "queue") is not None:
+        script.queue = context.entry(element, "queue", scope, f"<{xml_name} queue>", writes=False, kind=ANY)
+        return node
+    script.state = context.board.make(f"next item at line {element.place.line}", scope.path, element.place)
+    script.state.uses.append(Use(PORT_TYPES["uint16_t"], element.place, f"<{xml_name}>", True))
     return node
 
 

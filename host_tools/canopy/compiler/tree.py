@@ -41,7 +41,9 @@ class Script:
     least: int = 0
     """parameter: its least value."""
     state: Entry | None = None
-    """take: the place of the next item."""
+    """take: the place of the next item of a literal list."""
+    queue: Entry | None = None
+    """take: the entry that holds the queue; None for a literal list."""
     body: tuple[str, ...] = ()
 
     @property

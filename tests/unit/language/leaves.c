@@ -9,6 +9,15 @@ canopy_status_t find_goal_tick(const language_input_t *in, const find_goal_ports
     return CANOPY_SUCCESS;
 }
 
+canopy_status_t fill_queue_tick(const language_input_t *in, const fill_queue_ports_t *ports)
+{
+    static const canopy_queue_int32_3_t queue = {.count = 3, .items = {5, 70, 900}};
+
+    (void)in;
+    fill_queue_set_queue(ports, &queue);
+    return CANOPY_SUCCESS;
+}
+
 canopy_status_t use_goal_tick(const language_input_t *in, const use_goal_ports_t *ports, use_goal_state_t *self)
 {
     static const float_free_t value = {.bytes = {1, 2, 3}};
