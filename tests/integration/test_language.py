@@ -389,3 +389,55 @@ def test_a_tree_as_an_editor_saves_it_compiles_and_links_with_its_stubs(tmp_path
         ["gcc", "-std=c11", *WARNINGS, *include, *map(str, sources), "-o", str(tmp_path / "program")], check=True
     )
     subprocess.run([str(tmp_path / "program")], check=True)
+
+
+CONSTRUCTS = """\
+<Script code="t := 'a' .. 1; b := true; n := 0x10; w := 5000000000; n -= 3; n *= 2; b = !b"/>
+<Script code="n /= 1; w += n; s := b ? t : 'z'; k := Climate.Door == Open ? 1 : 2; m := Climate.Uptime + 0"/>
+<ScriptCondition code="0 &lt; n &lt;= 10 || Climate.Window == false || Climate.Door != 'Shut'"/>
+<ScriptCondition code="Climate.Temperature - Climate.Temperature2 > n / 4"/>
+<ScriptCondition code="Climate.Temperature * 3 - 1.5 &lt; -n"/>
+<ScriptCondition code="1"/>
+<ScriptCondition code="u8 >= 0 &amp;&amp; u64 >= 5"/>
+<Script code="Fan.Mode := Climate.Temperature > 3 ? 1 : 5; Fan.Turbo := n; Fan.Ticks := u8 | 0x100; Fan.Speed := u8 * 10"/>
+<SetBlackboard value="{Climate.Door}" output_key="door"/>
+<SetBlackboard value="{Climate.Window}" output_key="{window}"/>
+<SetBlackboard value="blue" output_key="{colour}"/>
+<SetBlackboard value="17" output_key="u8"/>
+<UnsetBlackboard key="colour"/>
+<WaitValueUpdate entry="{colour}"><AlwaysSuccess/></WaitValueUpdate>
+<Switch2 variable="{Climate.Door}" case_1="Open" case_2="Shut"><AlwaysSuccess/><AlwaysFailure/><AlwaysSuccess/></Switch2>
+<Switch2 variable="{colour}" case_1="blue" case_2="{t}"><AlwaysSuccess/><AlwaysFailure/><AlwaysSuccess/></Switch2>
+<LoopString queue="a;b;c" value="{letter}"><ScriptCondition code="letter == 'b'"/></LoopString>
+<LoopBool queue="true;false" value="{bit}" if_empty="SKIPPED"><AlwaysSuccess/></LoopBool>
+<LoopDouble queue="1.5;2" value="{real}"><ScriptCondition code="real / n > 1.5 &amp;&amp; real * 2 != Climate.Temperature"/></LoopDouble>
+<Script code="real += 0.1; n = real > 2 ? 1 : 2; f32 = real; u8 = real; u64 = w; r2 := real - n"/>
+<Precondition if="b" else="RUNNING"><Timeout msec="{n}"><Delay delay_msec="{u8}"><AlwaysSuccess/></Delay></Timeout></Precondition>
+<Parallel success_count="{n}" failure_count="1"><AlwaysSuccess/><RunOnce then_skip="{b}"><AlwaysSuccess/></RunOnce></Parallel>
+<Say text="{t}" any="{w}"/>
+<Go speed="{Climate.Temperature2}"/>"""
+
+
+def test_every_construct_compiles_without_a_warning(tmp_path: Path) -> None:
+    ports = {"u8": "uint8_t", "u64": "uint64_t", "f32": "float"}
+    model = MODEL + '<SubTree ID="Main">'
+    model += (
+        "".join(f'<input_port name="{name}" type="{kind}" default="1"/>' for name, kind in ports.items()) + "</SubTree>"
+    )
+    result = compile_files(
+        tmp_path, {"main.xml": tree(f"<Sequence>{CONSTRUCTS}</Sequence>", model=model)}, "--allow-floating-point"
+    )
+    assert result.exit_code == 0, result.output
+    include = ["-I", str(ROOT / "runtime" / "include"), "-I", str(tmp_path / "out")]
+    for compiler in ("gcc", "clang"):
+        command = [
+            compiler,
+            "-std=c11",
+            *WARNINGS,
+            *include,
+            "-c",
+            str(tmp_path / "out" / "main_app.c"),
+            "-o",
+            "/dev/null",
+        ]
+        subprocess.run(command, check=True)

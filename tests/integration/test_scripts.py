@@ -195,7 +195,8 @@ def samples() -> list[Sample]:
     return kept
 
 
-TREE = """<root BTCPP_format="4" main_tree_to_execute="T"><BehaviorTree ID="T"><Sequence>{nodes}</Sequence></BehaviorTree>
+TREE = """<root BTCPP_format="4" main_tree_to_execute="T">
+<BehaviorTree ID="T"><Sequence>{nodes}</Sequence></BehaviorTree>
 <TreeNodesModel><SubTree ID="T">{ports}</SubTree></TreeNodesModel></root>"""
 
 HARNESS = """

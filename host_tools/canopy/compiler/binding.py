@@ -176,7 +176,7 @@ class _Binder:
         for part in expressions:
             if isinstance(part, Number):
                 wide.append(abs(part.value) >= 2**31)
-            elif isinstance(part, Name):
+            elif isinstance(part, Name) and ("." in part.name or compiler.scope.knows(part.name)):
                 try:
                     value = compiler.named(part.name, part.index)
                 except (UntypedError, ScriptError):

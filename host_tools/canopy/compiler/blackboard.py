@@ -143,6 +143,13 @@ class Scope:
             scope.names[name] = scope.board.make(name, scope.path, place)
         return scope.names[name]
 
+    def knows(self, name: str) -> bool:
+        """Is it a name that something has used, here or where _autoremap leads?"""
+        scope: Scope = self
+        while name not in scope.names and scope.autoremap and scope.parent is not None:
+            scope = scope.parent
+        return name in scope.names
+
     def help_for(self, name: str) -> str:
         """The nearest name in this scope that something writes."""
         known = [n for n, target in self.names.items() if isinstance(target, Entry) and _is_given(target)]

@@ -148,6 +148,12 @@ class Arithmetic:
         return self._exact("-", first, second, first.low - second.high, first.high - second.low, scale)
 
     def _exact(self, sign: str, first: Num, second: Num, low: int, high: int, scale: Fraction) -> Num:
+        units = (low * scale, high * scale)
+        whole = first.scale.denominator == 1 and second.scale.denominator == 1
+        if scale != 1 and whole and (units[0] < INT64[0] or units[1] > INT64[1]):
+            # Whole numbers fit into 64 bits, whatever their step: so that they saturate where whole numbers do.
+            one, two = self.scaled(first, Fraction(1), 0), self.scaled(second, Fraction(1), 0)
+            return self._exact(sign, one, two, int(units[0]), int(units[1]), Fraction(1))
         if low < INT64[0] or high > INT64[1]:
             c = f"{_HELPERS[sign]}({first.as_type(True)}, {second.as_type(True)}, {self._faults})"
             return result(c, max(low, INT64[0]), min(high, INT64[1]), scale)
@@ -166,10 +172,10 @@ class Arithmetic:
             if right.value == 1:
                 return _as_number(left)
             scale = left.scale * abs(right.value)
-            if scale.denominator == 1 and left.scale == 1:
-                right_num = self.scaled(right, Fraction(1), index)
-                ends = (left.low * right_num.low, left.high * right_num.low)
-                return self._exact("*", left, right_num, min(ends), max(ends), Fraction(1))
+            ends = sorted((left.low * left.scale * right.value, left.high * left.scale * right.value))
+            if left.scale.denominator == 1 and scale.denominator == 1 and (ends[0] < INT64[0] or ends[1] > INT64[1]):
+                base, factor = self.scaled(left, Fraction(1), index), self.scaled(right, Fraction(1), index)
+                return self._exact("*", base, factor, int(ends[0]), int(ends[1]), Fraction(1))
             number_ = Num(left.c, left.c_type, left.low, left.high, scale)
             return number_ if right.value > 0 else self.unary("-", number_, index)
         ends4 = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]

@@ -132,7 +132,7 @@ class Compiler:
 
     def _comparable(self, part: Expression, chain: Comparison) -> Value:
         """A name of a signal's value may stand without quotes beside the signal, as enums do in BehaviorTree.CPP."""
-        if isinstance(part, Name) and "." not in part.name and part.name not in self.scope.names:
+        if isinstance(part, Name) and "." not in part.name and not self.scope.knows(part.name):
             for other in chain.operands:
                 if isinstance(other, Name) and "." in other.name:
                     value = self.named(other.name, other.index)
