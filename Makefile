@@ -2,13 +2,16 @@
 # A few lines over CMakePresets.json and a Python environment in build/venv. `make help` lists the targets.
 MAKEFLAGS += --no-print-directory
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+export PYTHON3
 export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
 PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
 SETUP := host_tools/setup
+FUZZ_SECONDS ?= 60
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
-.PHONY: help demo test lint format check-all clean test-host test-firmware test-python test-rig test-clang test-asan
+.PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
+.PHONY: coverage fuzz test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -22,14 +25,14 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test
+	$(SETUP)/make-venv can,lcm,test,differential,bench
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
 	$(call BUILD,host)
 	ctest --preset host
 
-test-firmware: # the same tests on QEMU's Cortex-M4, and the sizes for Cortex-M0+ and Cortex-M4
+test-firmware: # the same tests as firmware in QEMU, and the sizes of the code for Cortex-M0+ and Cortex-M4
 	$(call BUILD,firmware-m0plus)
 	$(call BUILD,firmware-m4)
 	ctest --preset firmware-m0plus
@@ -45,28 +48,59 @@ test-rig: # integration tests on vcan0: one guest for all of them
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,lint
+	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
 	$(SETUP)/lint --fix
 
-check-all: ## what takes longer: clang, and the sanitizers under every test that needs no CAN interface
+check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
-	$(SETUP)/make-venv can,lcm,test
-	@$(MAKE) test-clang test-asan
+	$(SETUP)/make-venv can,lcm,test,differential
+	@$(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
 
 test-clang:
 	$(call BUILD,clang)
 	ctest --preset clang
 
+test-portable: # 32 bit, big-endian, and clang's sanitizers: the unit tests
+	$(call BUILD,i686)
+	ctest --preset i686
+	$(call BUILD,powerpc)
+	ctest --preset powerpc
+	$(call BUILD,asan-clang)
+	ctest --preset asan-clang
+
+coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fails below 100 %
+	$(SETUP)/ensure-packages coverage
+	$(SETUP)/make-venv can,lcm,test
+	$(call BUILD,coverage)
+	rm -rf build/coverage/profiles
+	LLVM_PROFILE_FILE=$(CURDIR)/build/coverage/profiles/%m-%p.profraw ctest --preset coverage
+	$(PYTHON) tests/coverage/report.py build/coverage runtime
+
+test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed each time
+	$(call BUILD,host)
+	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
+
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
-	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig" tests/integration tests/differential
+
+fuzz: ## libFuzzer on tables, states, frames and traces, FUZZ_SECONDS=60 in all
+	$(SETUP)/ensure-packages fuzz
+	$(SETUP)/make-venv can,test
+	$(call BUILD,fuzz)
+	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
+
+bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
+	$(SETUP)/ensure-packages bench
+	$(SETUP)/make-venv can,lcm,test,differential,bench
+	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md
 
 clean: ## remove everything that was built
 	rm -rf build

@@ -14,12 +14,13 @@
 # ${CMAKE_CURRENT_BINARY_DIR}/generated/NAME.
 include_guard(GLOBAL)
 
-include(Python) # CANOPY_PYTHON
+include("${CMAKE_CURRENT_LIST_DIR}/Python.cmake") # CANOPY_PYTHON
 
 # A change of the compiler compiles every application again.
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH CANOPY_SOURCE_DIR)
 file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
-     "${PROJECT_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${PROJECT_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
-     "${PROJECT_SOURCE_DIR}/runtime/include/canopy/nodes.def")
+     "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
+     "${CANOPY_SOURCE_DIR}/runtime/include/canopy/nodes.def")
 # A property: a variable would be known only where this file was included first.
 set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
 
@@ -59,7 +60,8 @@ function(canopy_add_application NAME)
   endforeach()
   add_custom_command(
     OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"
-    COMMAND "${CANOPY_PYTHON}" -m canopy compile "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
+    COMMAND "${CANOPY_PYTHON}" -I -m canopy compile # -I: the folder `canopy` of a build is no package
+            "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
             --period-ms "${APP_PERIOD_MS}" --output "${folder}" --depfile "${folder}.d" ${options}
     DEPENDS "${APP_TREE}" "${APP_DBC}" ${compiler}
     DEPFILE "${folder}.d" # the files that the tree includes

@@ -14,11 +14,13 @@ set(allowed_pattern "^(__aeabi_(u?l?divmod|u?idiv|u?idivmod|uldivmod|ll?sl|llsr|
 |__u?(div|mod|divmod)[sdt]i[34]|__(mul|ashl|ashr|lshr)[dt]i3|__(clz|ctz|popcount|ffs|bswap)[sd]i2\
 |_GLOBAL_OFFSET_TABLE_|__stack_chk_(fail|guard))$")
 
-set(allocator "^_*(malloc|calloc|realloc|free|aligned_alloc|memalign|posix_memalign|strdup|strndup|sbrk|mmap|brk)(_r)?$")
-set(stdio "^_*(i?v?[fsd]?n?i?printf.*|f?puts|f?putc|putchar|f?getc|getchar|fopen|fclose|fread|fwrite|fflush|[fs]?scanf|\
-perror|stdout|stderr|stdin|impure_ptr|[a-z]*printf_chk)$")
-set(floating_point "^(__aeabi_(c?[fd][a-z]+[0-9]*[a-z]*|u?[il]2[fd])|__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|cmp|unord)[sdtx]f[23]|\
-__(float|fix)[a-z]+|__(extend|trunc)[sdthx]f[sdthx]f2|__pow[sdtx]f2)$")
+set(allocator "^_*(malloc|calloc|realloc|free|aligned_alloc|memalign|posix_memalign|strdup|strndup|sbrk|brk|mmap)\
+(_r)?$")
+set(stdio "^_*(i?v?[fsd]?n?i?printf.*|f?puts|f?putc|putchar|f?getc|getchar|fopen|fclose|fread|fwrite|fflush|\
+[fs]?scanf|perror|stdout|stderr|stdin|impure_ptr|[a-z]*printf_chk)$")
+set(floating_point "^(__aeabi_(c?[fd][a-z]+[0-9]*[a-z]*|u?[il]2[fd])|\
+__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|cmp|unord)[sdtx]f[23]|__(float|fix)[a-z]+|\
+__(extend|trunc)[sdthx]f[sdthx]f2|__pow[sdtx]f2)$")
 
 if(NOT LIBRARY OR NOT NM)
     message(FATAL_ERROR "Give -DLIBRARY= and -DNM=.")
@@ -50,7 +52,8 @@ foreach(line IN LISTS lines)
     endif()
     list(APPEND defined "${symbol}")
     # .data.rel.ro is constant data with addresses in it, which position-independent code has to have relocated.
-    if((class MATCHES "^[bBdDsSgGcC]$" AND NOT section MATCHES "^\\.data\\.rel\\.ro") OR section MATCHES "^\\.t?(data|bss)$")
+    if((class MATCHES "^[bBdDsSgGcC]$" AND NOT section MATCHES "^\\.data\\.rel\\.ro")
+       OR section MATCHES "^\\.t?(data|bss)$")
         list(APPEND problems "${object}: ${symbol} is writable memory (${section}); the runtime owns none")
     endif()
 endforeach()

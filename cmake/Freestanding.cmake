@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-# canopy_check_freestanding(TARGET): the build fails unless the static library TARGET could run on bare metal and owns no
-# memory: no allocator, no stdio, no floating-point helper, no other foreign symbol, .data and .bss empty.
-# CheckFreestanding.cmake has the rules. Not done with CANOPY_SANITIZE: sanitizers add symbols and data of their own.
+# canopy_check_freestanding(TARGET): the build fails unless the static library TARGET could run on bare metal and owns
+# no memory: no allocator, no stdio, no floating-point helper, no other foreign symbol, .data and .bss empty.
+# CheckFreestanding.cmake has the rules. Not done with CANOPY_INSTRUMENTED: that adds symbols and data.
 function(canopy_check_freestanding TARGET)
-    if(CANOPY_SANITIZE)
+    if(CANOPY_INSTRUMENTED)
         return()
     endif()
     set(stamp "${CMAKE_CURRENT_BINARY_DIR}/${TARGET}.freestanding")

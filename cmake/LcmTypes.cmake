@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Target lcm_types: what lcm-gen makes of host_tools/lcm/*.lcm. Python classes in <build>/lcm/python/canopy_msgs; with a
+# Target lcm_types: what lcm-gen makes of host_tools/lcm_types/*.lcm. Python classes in <build>/lcm/python/canopy_msgs; with a
 # JDK also <build>/lcm/canopy_msgs.jar, with which lcm-spy decodes Canopy's messages (`canopy spy`).
 #
 # LCM is a way to watch, not a need: where lcm-gen cannot run the build goes on, and configure says so in one line.
@@ -39,7 +39,7 @@ endfunction()
 
 # Generates into folders that are emptied first, so that a type that is gone leaves nothing behind.
 function(canopy_add_lcm_types FOLDER)
-    set(source "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../host_tools/lcm")
+    set(source "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../host_tools/lcm_types")
     set(build "${CMAKE_BINARY_DIR}/lcm")
     file(GLOB types CONFIGURE_DEPENDS "${source}/*.lcm")
     add_custom_command(

@@ -6,6 +6,6 @@ if(NOT CANOPY_PYTHON)
     set(CANOPY_PYTHON "${Python3_EXECUTABLE}" CACHE FILEPATH "Python interpreter with the package canopy-bt")
 endif()
 if(NOT EXISTS "${CANOPY_PYTHON}")
-    message(FATAL_ERROR "CANOPY_PYTHON is ${CANOPY_PYTHON}, which does not exist. Run `make venv`, or set "
-        "-DCANOPY_PYTHON= to an interpreter that has the package of host_tools/ (pip install ./host_tools).")
+    message(FATAL_ERROR "CANOPY_PYTHON is ${CANOPY_PYTHON}, which does not exist. Run `make demo` or `make test`, "
+        "which make it, or set -DCANOPY_PYTHON= to an interpreter that has the package of host_tools/ (pip install ./host_tools).")
 endif()

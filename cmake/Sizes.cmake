@@ -18,8 +18,8 @@ function(canopy_add_sizes_target)
     endforeach()
     cmake_path(GET CMAKE_BINARY_DIR FILENAME build)
     add_custom_target(sizes
-        COMMAND "${CMAKE_COMMAND}" ${arguments} "-DTARGETS=${targets}" "-DTITLE=${build}" "-DSIZE=${CANOPY_SIZE_PROGRAM}"
-                -P "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/PrintSizes.cmake"
+        COMMAND "${CMAKE_COMMAND}" ${arguments} "-DTARGETS=${targets}" "-DTITLE=${build}"
+                "-DSIZE=${CANOPY_SIZE_PROGRAM}" -P "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/PrintSizes.cmake"
         DEPENDS ${targets}
         VERBATIM)
 endfunction()

@@ -2,8 +2,8 @@
 # The target `canopy_unity`: ThrowTheSwitch's Unity, from the first of
 #   1. an installed unityConfig.cmake,
 #   2. UNITY_DIR, a folder with src/unity.c (or unity.c),
-#   3. the source distribution of the PyPI package pytest-unity, which holds the whole of Unity 2.7.0; it is fetched with
-#      pip, its checksum compared, and unpacked in the build folder.
+#   3. the source distribution of the PyPI package pytest-unity, which holds the whole of Unity 2.7.0; it is fetched
+#      with pip, its checksum compared, and unpacked in the build folder.
 set(UNITY_DIR "" CACHE PATH "Folder of Unity's sources; empty: an installed one, else fetched with pip")
 set(CANOPY_UNITY_PACKAGE "pytest-unity==0.1.0")
 set(CANOPY_UNITY_ARCHIVE "pytest_unity-0.1.0.tar.gz")

@@ -279,7 +279,8 @@ def run_parts(build_dir: Path, spec: str | None, stop: StopFlag) -> list[Result]
         demo = Demo(build_dir, spec, with_lcm, folder, stop)
         for number, part in enumerate(PARTS, 1):
             title = f"{number} of {len(PARTS)}: {part.application}: {part.title}"
-            click.echo(title)
+            if not sys.stdout.isatty():  # on a terminal it is in the picture
+                click.echo(title)
             with make_display(False, _LINE_PERIOD_S) as display:
                 results.append(demo.run(part, display, title))
     return results

@@ -59,10 +59,12 @@ def open_lcm(url: str, what: str) -> lcm.LCM | None:
 def _missing_package() -> str | None:
     try:
         import lcm
-    except ModuleNotFoundError:
-        return _NO_PACKAGE
     except ImportError as error:
-        return f"{error}; mend with: {_MEND_GLIB if 'libglib' in str(error) else 'pip install --force-reinstall lcm'}"
+        if error.name == "lcm":
+            return _NO_PACKAGE
+        # The wheel looks for its library in two places: what was wrong with the first one is what counts.
+        cause = error.__context__ if isinstance(error.__context__, ImportError) else error
+        return f"{cause}; mend with: {_MEND_GLIB if 'libglib' in str(cause) else 'pip install --force-reinstall lcm'}"
     # Any folder lcm/ on Python's path, such as the one with the .lcm files, can be imported, and is no package.
     return _NO_PACKAGE if getattr(lcm, "__file__", None) is None else None
 

@@ -217,8 +217,13 @@ class TraceDecoder:
 
         The former has only so many frames left. When as many are lost, this frame cannot be one of them.
         """
-        left = self._tick.frames_left if self._tick is not None else 0
-        return self.flush() if self._follow(sequence) >= left else ()
+        tick = self._tick
+        missing = self._follow(sequence)
+        if tick is None or missing >= tick.frames_left:
+            return self.flush()
+        # Changes come first in a tick: what is missing before one of its frames were Changes, of two nodes each.
+        tick.changes_left = max(0, tick.changes_left - 2 * missing)
+        return ()
 
     def _follow(self, sequence: int) -> int:
         """Compares the frame's sequence number with the one that was due; returns how many are missing between."""

@@ -115,5 +115,6 @@ void canopy_bus_commit(canopy_bus_state_t *self, const canopy_can_t *can, uint32
 
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters)
 {
-    return counters->wrong_form + counters->wrong_crc + counters->wrong_sequence + counters->out_of_range;
+    return canopy_sum(canopy_sum(counters->wrong_form, counters->wrong_crc),
+                      canopy_sum(counters->wrong_sequence, counters->out_of_range));
 }

@@ -100,7 +100,7 @@ canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
     canopy_trace_send(app->trace, app->trace_state, app->tree_instance, self->config->can,
                       &(canopy_trace_tick_t){.tick = self->ticks, .root = root, .overruns = self->overruns},
                       &app->bus_state->counters);
-    canopy_count(&self->ticks);
+    self->ticks++;
     if (app->tree_instance->faults != faults) {
         report(self, CANOPY_FAULT_LEAF_STATUS, app->tree_instance->fault_node);
     }

@@ -54,37 +54,40 @@ static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t 
     send(self, can, config->tick, data);
 }
 
-/** The next node from `node` on whose status has changed, or node_count; what is found counts as sent. */
-static uint16_t take_change(canopy_trace_state_t *self, const canopy_tree_instance_t *tree, uint16_t node)
+/** One CanopyChange frame with one or two nodes, whose statuses count as sent. */
+static void send_change(const canopy_trace_config_t *config, canopy_trace_state_t *self,
+                        const canopy_tree_instance_t *tree, const canopy_can_t *can, const uint16_t pair[2])
 {
-    while (node < tree->tree->node_count && self->sent[node] == tree->status[node]) {
-        node++;
-    }
-    if (node < tree->tree->node_count) {
-        self->sent[node] = tree->status[node];
-    }
-    return node;
+    uint8_t data[8] = {self->sequence};
+    unsigned status_b = pair[1] != (uint16_t)NO_NODE ? tree->status[pair[1]] : (unsigned)NO_STATUS;
+
+    put16(&data[1], pair[0]);
+    put16(&data[3], pair[1]);
+    data[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
+    data[6] = config->tree;
+    self->sequence++;
+    send(self, can, config->change, data);
 }
 
+/** The first `changes` nodes whose statuses have changed, two a frame. */
 static void send_changes(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                          const canopy_tree_instance_t *tree, const canopy_can_t *can, uint32_t changes)
 {
-    uint16_t node = 0;
+    uint16_t pair[2] = {NO_NODE, NO_NODE};
+    unsigned filled = 0;
 
-    while (changes > 0u) {
-        uint16_t a = take_change(self, tree, node);
-        uint16_t b = changes > 1u ? take_change(self, tree, (uint16_t)(a + 1u)) : (uint16_t)NO_NODE;
-        uint8_t data[8] = {self->sequence};
-        unsigned status_b = b != NO_NODE ? tree->status[b] : (unsigned)NO_STATUS;
-
-        put16(&data[1], a);
-        put16(&data[3], b);
-        data[5] = (uint8_t)(tree->status[a] | (status_b << 4));
-        data[6] = config->tree;
-        self->sequence++;
-        send(self, can, config->change, data);
-        changes -= changes > 1u ? 2u : 1u;
-        node = (uint16_t)(b + 1u);
+    for (uint16_t node = 0; node < tree->tree->node_count; node++) {
+        if (self->sent[node] == tree->status[node] || changes == 0u) {
+            continue;
+        }
+        self->sent[node] = tree->status[node];
+        pair[filled++] = node;
+        changes--;
+        if (filled == 2u || changes == 0u) {
+            send_change(config, self, tree, can, pair);
+            pair[1] = NO_NODE;
+            filled = 0;
+        }
     }
 }
 
@@ -116,7 +119,7 @@ static void send_health(const canopy_trace_config_t *config, canopy_trace_state_
 
     put16(&data[0], at_most16(canopy_bus_rejected(counters)));
     put16(&data[2], at_most16(counters->unknown_id));
-    put16(&data[4], at_most16(counters->tx_dropped + self->tx_dropped));
+    put16(&data[4], at_most16(canopy_sum(counters->tx_dropped, self->tx_dropped)));
     put16(&data[6], at_most16(tree->faults));
     send(self, can, config->health, data);
 }

@@ -15,7 +15,6 @@
 #include "nodes/parallel.h"
 #include "nodes/parallel_all.h"
 #include "nodes/precondition.h"
-#include "nodes/reactive.h"
 #include "nodes/reactive_parallel.h"
 #include "nodes/repeat.h"
 #include "nodes/result.h"
@@ -61,9 +60,11 @@ canopy_status_t canopy_leaf_fault(canopy_tree_instance_t *self, uint16_t node)
     return CANOPY_FAILURE;
 }
 
-/** The tick has come down to this node. */
-static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
+/** The tick has come down to this node; those of nodes/sequence.h are entered by the tick itself. */
+static CANOPY_SELDOM canopy_step_t enter(canopy_tree_instance_t *self, canopy_index_t index)
 {
+    uint16_t node = (uint16_t)index;
+
     switch ((canopy_node_type_t)self->tree->nodes[node].type) {
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
@@ -76,17 +77,11 @@ static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
         return canopy_done(CANOPY_FAILURE);
     case CANOPY_NODE_SLEEP:
         return canopy_sleep_enter(self, node);
-    case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
-        return canopy_sequence_enter(self, node);
     case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
         return canopy_sequence_with_memory_enter(self, node);
     case CANOPY_NODE_ASYNC_SEQUENCE:
     case CANOPY_NODE_ASYNC_FALLBACK:
         return canopy_async_sequence_enter(self, node);
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-    case CANOPY_NODE_REACTIVE_FALLBACK:
-        return canopy_reactive_enter(node);
     case CANOPY_NODE_PARALLEL:
         return canopy_parallel_enter(self, node);
     case CANOPY_NODE_PARALLEL_ALL:
@@ -131,31 +126,30 @@ static inline canopy_step_t enter(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_enter(self, node);
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_REACTIVE_SEQUENCE:
+    case CANOPY_NODE_REACTIVE_FALLBACK:
     case CANOPY_NODE_TYPES:
         break;
     }
     return canopy_done(canopy_leaf_fault(self, node));
 }
 
-/** A child of this node has returned. */
-static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                       canopy_status_t status)
+/** A child of this node has returned; those of nodes/sequence.h are told by the tick itself. */
+static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, canopy_index_t parent, canopy_index_t index,
+                                              canopy_status_t status)
 {
+    uint16_t node = (uint16_t)parent;
+    uint16_t child = (uint16_t)index;
+
     switch ((canopy_node_type_t)self->tree->nodes[node].type) {
-    case CANOPY_NODE_SEQUENCE:
-        return canopy_sequence_child(self, node, child, status, CANOPY_SUCCESS);
-    case CANOPY_NODE_FALLBACK:
-        return canopy_sequence_child(self, node, child, status, CANOPY_FAILURE);
     case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
         return canopy_sequence_with_memory_child(self, node, child, status);
     case CANOPY_NODE_ASYNC_SEQUENCE:
         return canopy_async_sequence_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_ASYNC_FALLBACK:
         return canopy_async_sequence_child(self, node, child, status, CANOPY_FAILURE);
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-        return canopy_reactive_child(self, node, child, status, CANOPY_SUCCESS);
-    case CANOPY_NODE_REACTIVE_FALLBACK:
-        return canopy_reactive_child(self, node, child, status, CANOPY_FAILURE);
     case CANOPY_NODE_PARALLEL:
         return canopy_parallel_child(self, node, child, status);
     case CANOPY_NODE_PARALLEL_ALL:
@@ -180,12 +174,10 @@ static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t no
         return canopy_repeat_child(self, node, child, status, CANOPY_SUCCESS);
     case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
         return canopy_repeat_child(self, node, child, status, CANOPY_FAILURE);
-    case CANOPY_NODE_DELAY:
-        return canopy_delay_child(self, node, child, status);
-    case CANOPY_NODE_TIMEOUT:
-        return canopy_timeout_child(self, child, status);
     case CANOPY_NODE_RUN_ONCE:
         return canopy_run_once_child(self, node, child, status);
+    case CANOPY_NODE_DELAY:
+    case CANOPY_NODE_TIMEOUT:
     case CANOPY_NODE_PRECONDITION:
     case CANOPY_NODE_SKIP_UNLESS_UPDATED:
     case CANOPY_NODE_WAIT_VALUE_UPDATE:
@@ -199,6 +191,10 @@ static inline canopy_step_t child_done(canopy_tree_instance_t *self, uint16_t no
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_child(self, node, child, status);
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_REACTIVE_SEQUENCE:
+    case CANOPY_NODE_REACTIVE_FALLBACK:
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
     case CANOPY_NODE_STATEFUL_ACTION:
@@ -218,13 +214,6 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     switch ((canopy_node_type_t)self->tree->nodes[node].type) {
     case CANOPY_NODE_STATEFUL_ACTION:
         canopy_stateful_action_halt(self, node);
-        break;
-    case CANOPY_NODE_REPEAT:
-    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
-        canopy_repeat_halt(self, node);
-        break;
-    case CANOPY_NODE_DELAY:
-        canopy_delay_halt(self, node);
         break;
     case CANOPY_NODE_ATTRIBUTES:
         canopy_attributes_halt(self, node);
@@ -255,6 +244,9 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_FORCE_SUCCESS:
     case CANOPY_NODE_FORCE_FAILURE:
     case CANOPY_NODE_KEEP_RUNNING_UNTIL_FAILURE:
+    case CANOPY_NODE_REPEAT:
+    case CANOPY_NODE_RETRY_UNTIL_SUCCESSFUL:
+    case CANOPY_NODE_DELAY:
     case CANOPY_NODE_TIMEOUT:
     case CANOPY_NODE_RUN_ONCE:
     case CANOPY_NODE_PRECONDITION:
@@ -272,24 +264,43 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
 canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now)
 {
     const canopy_node_t *nodes = self->tree->nodes;
-    uint16_t node = 0;
+    const canopy_leaf_t *leaves = self->tree->leaves;
+    canopy_index_t node = 0;
 
     self->now = now;
     for (;;) {
-        canopy_step_t step = enter(self, node);
+        const canopy_node_t *at = &nodes[node];
+        canopy_status_t go_on = canopy_sequence_go_on[at->type];
+        canopy_index_t step;
 
+        if (go_on != CANOPY_IDLE) {
+            step = canopy_sequence_enter(self, at, node);
+            step = canopy_sequence_tick(self, at, node, step, &nodes[step], leaves, go_on);
+        } else {
+            step = enter(self, node);
+        }
         while (step >= CANOPY_STEP_DONE) {
             canopy_status_t status = (canopy_status_t)(step - CANOPY_STEP_DONE);
-            uint16_t child = node;
+            canopy_index_t child = node;
+            canopy_index_t next = at->end;
 
             self->status[child] = (uint8_t)status;
             if (child == 0u) {
                 return status;
             }
-            node = nodes[child].parent;
-            step = child_done(self, node, child, status);
+            node = at->parent;
+            at = &nodes[node];
+            go_on = canopy_sequence_go_on[at->type];
+            if (go_on == CANOPY_IDLE) {
+                step = child_done(self, node, child, status);
+                continue;
+            }
+            step = canopy_sequence_child(self, at, node, child, next, status, go_on);
+            if (step < CANOPY_STEP_DONE) {
+                step = canopy_sequence_tick(self, at, node, step, &nodes[step], leaves, go_on);
+            }
         }
-        node = (uint16_t)step;
+        node = step;
     }
 }
 

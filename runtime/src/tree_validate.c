@@ -105,11 +105,28 @@ static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
     return true;
 }
 
-/** The node's own fields: its state words, its parameters, its functions. */
+/**
+ * The node's own state words: after those of the nodes before it. Shared words would be the one way to make a node
+ * resume at what is not its child.
+ */
+static bool words_fit(const canopy_tree_t *tree, const canopy_node_t *node, uint32_t *words_end)
+{
+    const uint8_t words = shapes[node->type].words;
+
+    if (words == 0u) {
+        return true;
+    }
+    if (node->state < *words_end || (uint32_t)node->state + words > tree->word_count) {
+        return false;
+    }
+    *words_end = (uint32_t)node->state + words;
+    return true;
+}
+
+/** The node's own fields: its parameters, its functions. */
 static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, const canopy_shape_t *shape)
 {
-    return (shape->words == 0u || (uint32_t)node->state + shape->words <= tree->word_count) &&
-           (shape->parameters == 0u || (uint32_t)node->parameter + shape->parameters <= tree->parameter_count) &&
+    return (shape->parameters == 0u || (uint32_t)node->parameter + shape->parameters <= tree->parameter_count) &&
            functions_fit(tree, node) && meaning_fits(tree, node);
 }
 
@@ -132,6 +149,8 @@ static bool children_fit(const canopy_tree_t *tree, uint16_t index, const canopy
 
 canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_node)
 {
+    uint32_t words_end = 0;
+
     if (tree == NULL || tree->nodes == NULL || tree->node_count == 0u || tree->node_count > CANOPY_NODES_MAX ||
         (tree->leaf_count != 0u && tree->leaves == NULL) || (tree->control_count != 0u && tree->controls == NULL) ||
         (tree->script_count != 0u && tree->scripts == NULL) ||
@@ -140,10 +159,10 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
     }
     for (uint16_t index = 0; index < tree->node_count; index++) {
         const canopy_node_t *node = &tree->nodes[index];
-        bool ends_well = index == 0u ? node->parent == 0u && node->end == tree->node_count
-                                     : node->end > index && node->end <= tree->node_count && node->parent < index;
 
-        if (!ends_well || node->type >= (uint8_t)CANOPY_NODE_TYPES ||
+        /* Only the root's place is looked at here: every later node is a child of one that children_fit() accepted. */
+        if ((index == 0u && (node->parent != 0u || node->end != tree->node_count)) ||
+            node->type >= (uint8_t)CANOPY_NODE_TYPES || !words_fit(tree, node, &words_end) ||
             !fields_fit(tree, node, &shapes[node->type]) || !children_fit(tree, index, &shapes[node->type])) {
             if (bad_node != NULL) {
                 *bad_node = index;

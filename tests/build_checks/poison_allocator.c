@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Calls an allocator: CheckFreestanding.cmake must refuse it. */
-#include <stdlib.h>
+#include <stddef.h>
 
+void *malloc(size_t size);
 void *poison_allocate(void);
 
 void *poison_allocate(void)

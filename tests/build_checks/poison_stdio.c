@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file Prints: CheckFreestanding.cmake must refuse it. */
-#include <stdio.h>
-
+int puts(const char *text);
 int poison_print(void);
 
 int poison_print(void)

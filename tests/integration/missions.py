@@ -265,9 +265,7 @@ def bad_frames_change_nothing_but_a_counter(build_dir: Path, bus: str) -> None:
             for bad in (*refused, *unknown):
                 noise.send(bad)
             observer.listen(0.1)
-        observer.wait_for(
-            lambda: observer.values.get("CanopyHealth", {}).get("RxRejected") == rounds * len(refused), 5
-        )
+        observer.wait_for(lambda: observer.values.get("CanopyHealth", {}).get("RxRejected") == rounds * len(refused), 5)
         assert observer.values["CanopyHealth"]["RxUnknown"] == rounds * len(unknown)
         assert set(observer.modes["PowerCommand"][before:]) == {"DoTask"}
         report = controller.end()
@@ -319,7 +317,9 @@ def the_mission_is_seen_in_lcm(build_dir: Path, bus: str) -> None:
     assert trees[-1]["application"] == "nao_home"
     assert structures[0]["name"] == ["Get home", "Walk Home", "Sit to Stand", "Lie down to Sit up"]
     assert structures[0]["parent"] == [-1, 0, 0, 0]
-    running = [key for key, _ in groupby(tuple(tree["status"]).index(1, 1) for tree in trees if 1 in tree["status"][1:])]
+    running = [
+        key for key, _ in groupby(tuple(tree["status"]).index(1, 1) for tree in trees if 1 in tree["status"][1:])
+    ]
     assert running == [3, 2, 1]
     assert trees[-1]["root_status"] == Status.SUCCESS
     assert robots[-1]["head_x"] == 0

@@ -68,7 +68,8 @@ def test_without_glib_one_line_says_what_to_install() -> None:
     script = f"""import sys
 class Broken:
     def find_spec(self, name, path=None, target=None):
-        if name == "lcm":
+        # As the wheel does: it asks for lcm._lcm, and when that fails for lcm.Release.
+        if name == "lcm._lcm":
             raise ImportError("libglib-2.0.so.0: cannot open shared object file: No such file or directory")
 sys.meta_path.insert(0, Broken())
 {OPEN}"""

@@ -98,6 +98,17 @@ def test_a_tick_without_its_changes_is_incomplete_and_the_snapshot_mends_it(mode
     assert view.lost == 2
 
 
+def test_a_later_ticks_snapshot_is_not_taken_for_this_ticks(models: dict[int, Model]) -> None:
+    source, decoder = TraceSource(10), TraceDecoder(models[10])
+    tick, *_, last_change, _ = source.frames([1, 1, 1, 1, 1, 1, 1, 0, 0, 0])  # three Changes and the Snapshot are lost
+    assert feed(decoder, [tick, last_change]) == []
+    *_, snapshot = source.frames([2, 1, 1, 1, 1, 1, 1, 0, 0, 0])  # CanopyTick and the Change are lost
+    (view,) = feed(decoder, [snapshot])
+    assert view.tick == 0
+    assert not view.complete
+    assert view.statuses[0] in (UNKNOWN, 1)
+
+
 def test_a_lost_tick_frame_is_a_missed_tick(models: dict[int, Model]) -> None:
     source, decoder = TraceSource(4), TraceDecoder(models[4])
     feed(decoder, source.frames([1, 3, 1, 0]))

@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -104,6 +106,22 @@ def test_time_limit(command: str) -> None:
     assert time.monotonic() - start < 20
 
 
+@contextmanager
+def started(*command: str) -> Iterator[subprocess.Popen[str]]:
+    """with-vcan, running the command; ended when the test has not done so."""
+    with subprocess.Popen([str(WITH_VCAN), "--", *command], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.kill()
+
+
+def next_line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
 def test_interrupt_reaches_the_command() -> None:
     script = (
         "import sys, time\n"
@@ -112,35 +130,29 @@ def test_interrupt_reaches_the_command() -> None:
         "except KeyboardInterrupt:\n"
         "    sys.exit(42)\n"
     )
-    with subprocess.Popen(
-        [str(WITH_VCAN), "--", "python3", "-c", script], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
+    with started("python3", "-c", script) as process:
+        assert next_line(process) == "ready\n"
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=20) == 42
 
 
+def children_of(parent: int) -> list[Path]:
+    numbers = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return [Path("/proc") / number for number in numbers]
+
+
 def test_nothing_is_left_when_it_is_killed() -> None:
-    with subprocess.Popen([str(WITH_VCAN), "--", "sh", "-c", "echo up; sleep 300"], stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"up\n"
-        if mode() == "native":
-            process.kill()
-            return
-        guests = guests_of(process.pid)
-        assert guests
+    with started("sh", "-c", "echo up; exec sleep 300") as process:
+        assert next_line(process) == "up\n"
+        # In mode native with-vcan has become the command itself.
+        left = children_of(process.pid)
+        assert left or mode() == "native"
         process.kill()
         process.wait()
-        deadline = time.monotonic() + 5
-        while any(Path(f"/proc/{guest}").exists() for guest in guests):
-            assert time.monotonic() < deadline, f"still there: {guests}"
-            time.sleep(0.05)
-
-
-def guests_of(parent: int) -> list[int]:
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return [int(child) for child in children]
+    deadline = time.monotonic() + 5
+    while any(child.exists() for child in left):
+        assert time.monotonic() < deadline, f"still there: {left}"
+        time.sleep(0.05)
 
 
 def test_rig_failure_is_told_from_the_commands() -> None:

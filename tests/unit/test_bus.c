@@ -254,6 +254,10 @@ static void a_ticked_write_wins_over_a_halt_handlers_whichever_came_first(void)
 
 static void constants_round_to_the_nearest_raw_value(void)
 {
+    const volatile double not_folded = -0.48; /* the same at run time */
+    const int32_t raw = CANOPY_RAW(int32_t, not_folded, 0.001, 0.0);
+
+    TEST_ASSERT_EQUAL_INT32(-480, raw);
     TEST_ASSERT_EQUAL_INT32(480, CANOPY_RAW(int32_t, 0.48, 0.001, 0.0));
     TEST_ASSERT_EQUAL_INT32(-480, CANOPY_RAW(int32_t, -0.48, 0.001, 0.0));
     TEST_ASSERT_EQUAL_INT32(29, CANOPY_RAW(int32_t, 0.29, 0.01, 0.0));

@@ -127,6 +127,16 @@ static void reactive_parallel_minus_one_means_all(void)
     EXPECT("SSK", CANOPY_SUCCESS, "abc");
 }
 
+static void reactive_parallel_needs_at_least_one_success(void)
+{
+    static const int32_t all_but_one = -2;
+
+    start_parallel(&all_but_one);
+    EXPECT("SSF", CANOPY_SUCCESS, "abc");
+    EXPECT("KKF", CANOPY_FAILURE, "abc");
+    EXPECT("KKS", CANOPY_SUCCESS, "abc");
+}
+
 static void sequence_with_memory_goes_on_where_it_failed_or_was_halted(void)
 {
     start_three_actions(CANOPY_NODE_SEQUENCE_WITH_MEMORY);
@@ -319,9 +329,54 @@ static void a_single_leaf_is_a_tree(void)
     EXPECT("F", CANOPY_FAILURE, "a");
 }
 
+static void expect_statuses(const char *expected, unsigned line)
+{
+    static const char letters[] = "IRSFK";
+    char seen[NODES_MAX] = "";
+
+    for (uint16_t node = 0; node < bench.tree.node_count; node++) {
+        seen[node] = letters[canopy_tree_status(&bench.instance, node)];
+    }
+    UNITY_TEST_ASSERT_EQUAL_STRING(expected, seen, line, "statuses of the nodes");
+}
+
+#define EXPECT_STATUSES(expected) expect_statuses(expected, __LINE__)
+
+/* Conditions, which Sequence and Fallback tick in a loop of their own, and an action between them. */
+static void children_keep_their_status_while_the_node_runs_and_are_idle_when_it_is_done(void)
+{
+    static canopy_node_t nodes[] = {INNER(SEQUENCE, 0, 5, 0, 0), CONDITION(0, 1, 0), CONDITION(0, 2, 1),
+                                    ACTION(0, 3, 2), CONDITION(0, 4, 3)};
+
+    nodes[0].type = (uint8_t)CANOPY_NODE_SEQUENCE;
+    START(nodes, none);
+    EXPECT("SKRS", CANOPY_RUNNING, "abc");
+    EXPECT_STATUSES("RSKRI");
+    EXPECT("FFRS", CANOPY_RUNNING, "c'");
+    EXPECT_STATUSES("RSKRI");
+    EXPECT("FFSF", CANOPY_FAILURE, "c'd");
+    EXPECT_STATUSES("FIIII");
+    EXPECT("SSRS", CANOPY_RUNNING, "abc");
+    EXPECT("SSSS", CANOPY_SUCCESS, "c'd");
+    EXPECT_STATUSES("SIIII");
+    EXPECT("KKRK", CANOPY_RUNNING, "abc");
+    EXPECT("KKKK", CANOPY_SKIPPED, "c'd");
+    EXPECT_STATUSES("KIIII");
+
+    nodes[0].type = (uint8_t)CANOPY_NODE_REACTIVE_FALLBACK;
+    START(nodes, none);
+    EXPECT("FKRS", CANOPY_RUNNING, "abc");
+    EXPECT_STATUSES("RFKRI");
+    EXPECT("KFRS", CANOPY_RUNNING, "abc'");
+    EXPECT_STATUSES("RKFRI");
+    EXPECT("FSRS", CANOPY_SUCCESS, "abc!");
+    EXPECT_STATUSES("SIIII");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(children_keep_their_status_while_the_node_runs_and_are_idle_when_it_is_done);
     RUN_TEST(sequence_resumes_at_the_running_child);
     RUN_TEST(fallback_is_its_mirror_image);
     RUN_TEST(skipped_children_are_as_if_not_there);
@@ -330,6 +385,7 @@ int main(void)
     RUN_TEST(a_halted_child_is_started_anew);
     RUN_TEST(reactive_parallel_counts_all_children_every_tick);
     RUN_TEST(reactive_parallel_minus_one_means_all);
+    RUN_TEST(reactive_parallel_needs_at_least_one_success);
     RUN_TEST(sequence_with_memory_goes_on_where_it_failed_or_was_halted);
     RUN_TEST(async_sequence_ends_the_tick_after_a_child_that_completed_at_once);
     RUN_TEST(async_fallback_is_its_mirror_image);

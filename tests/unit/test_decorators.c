@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Decorators, leaves' faults, and the validator, against docs/semantics.md. */
+/** @file Decorators and leaves' faults against docs/semantics.md. */
 #include "scripted_leaves.h"
 
 static bench_t bench;
@@ -226,59 +226,6 @@ static void a_wrong_status_of_a_leaf_is_a_failure_and_counted(void)
     TEST_ASSERT_EQUAL_UINT16(1, bench.instance.fault_node);
 }
 
-static void init_refuses_what_it_cannot_use(void)
-{
-    static const canopy_node_t nodes[] = {ACTION(0, 0, 0)};
-    static const canopy_tree_t tree = {.nodes = nodes, .leaves = &script_leaf, .node_count = 1, .leaf_count = 1};
-    static const canopy_tree_t empty = {.nodes = nodes};
-    canopy_tree_instance_t instance;
-    uint8_t status[1];
-
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&instance, &tree, status, NULL, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(NULL, &tree, status, NULL, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, NULL, status, NULL, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &tree, NULL, NULL, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_tree_init(&instance, &empty, status, NULL, NULL));
-}
-
-/** Validates a copy of a good table with one field changed. */
-static void refuses(uint16_t node, canopy_node_t wrong)
-{
-    canopy_node_t nodes[] = {INNER(SEQUENCE, 0, 5, 0, 0), ACTION(0, 1, 0), INNER(TIMEOUT, 0, 4, 1, 0), ACTION(2, 3, 1),
-                             ACTION(0, 4, 2)};
-    canopy_tree_t tree = {.nodes = nodes,
-                          .leaves = &script_leaf,
-                          .parameters = &three,
-                          .node_count = 5,
-                          .leaf_count = 1,
-                          .parameter_count = 1,
-                          .word_count = 5};
-    uint16_t bad = UINT16_MAX;
-
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tree, &bad));
-    nodes[node] = wrong;
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&tree, &bad));
-    TEST_ASSERT_LESS_OR_EQUAL_UINT16(node, bad);
-}
-
-static void the_validator_refuses_tables_that_a_tick_could_leave(void)
-{
-    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 6, 0, 0));
-    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 4, 0, 0));
-    refuses(0, (canopy_node_t)INNER(SEQUENCE, 1, 5, 0, 0));
-    refuses(0, (canopy_node_t)INNER(SEQUENCE, 0, 5, 5, 0));
-    refuses(0, (canopy_node_t)INNER(INVERTER, 0, 5, 0, 0));
-    refuses(1, (canopy_node_t)ACTION(1, 1, 0));
-    refuses(1, (canopy_node_t)INNER(SEQUENCE, 0, 2, 0, 0));
-    refuses(1, (canopy_node_t){.type = CANOPY_NODE_TYPES, .end = 2});
-    refuses(1, (canopy_node_t){.type = CANOPY_NODE_CONDITION, .end = 2, .leaf = 1});
-    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 2, 0));
-    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 4, 1, 1));
-    refuses(2, (canopy_node_t)INNER(TIMEOUT, 0, 5, 1, 0));
-    refuses(3, (canopy_node_t)ACTION(0, 3, 1));
-    refuses(4, (canopy_node_t){.type = CANOPY_NODE_CONDITION, .parent = 0, .end = 4});
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -297,7 +244,5 @@ int main(void)
     RUN_TEST(run_once_remembers_until_the_tree_is_reset);
     RUN_TEST(built_in_leaves);
     RUN_TEST(a_wrong_status_of_a_leaf_is_a_failure_and_counted);
-    RUN_TEST(init_refuses_what_it_cannot_use);
-    RUN_TEST(the_validator_refuses_tables_that_a_tick_could_leave);
     return UNITY_END();
 }

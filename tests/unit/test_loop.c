@@ -282,6 +282,21 @@ static void lost_trace_frames_are_counted(void)
     TEST_ASSERT_EQUAL_UINT8(4, trace_state.sequence);
 }
 
+static void the_tick_number_wraps_and_messages_go_on(void)
+{
+    unsigned count;
+
+    loop.ticks = UINT32_MAX;
+    (void)canopy_loop_cycle(&loop, 0);
+    TEST_ASSERT_EQUAL_UINT32(0, loop.ticks);
+    fake.tx_count = 0;
+    for (unsigned tick = 0; tick < 8u; tick++) {
+        (void)canopy_loop_cycle(&loop, 0);
+    }
+    (void)only(HEALTH_ID, &count);
+    TEST_ASSERT_EQUAL_UINT(2, count);
+}
+
 static void init_refuses_an_incomplete_application(void)
 {
     canopy_app_t wrong = app;
@@ -313,6 +328,7 @@ int main(void)
     RUN_TEST(the_trace_tells_what_changed_and_sends_the_rest_later);
     RUN_TEST(a_single_change_names_no_second_node);
     RUN_TEST(lost_trace_frames_are_counted);
+    RUN_TEST(the_tick_number_wraps_and_messages_go_on);
     RUN_TEST(init_refuses_an_incomplete_application);
     return UNITY_END();
 }

@@ -38,6 +38,7 @@ static void test_init_refuses_bad_arguments(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 0, 4));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, 0));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, 3));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, UINT32_MAX));
 }
 
 static void test_init_refuses_too_little_storage_also_where_the_product_overflows(void)

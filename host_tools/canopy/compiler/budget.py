@@ -2,7 +2,7 @@
 """What an application costs: RAM and constant tables on a 32-bit target, leaf calls in the worst tick, bus load.
 
 RAM and flash are those of the generated tables and of the one static object; the sizes of the user's own state types
-are not known here, and code is not counted: `make sizes` measures the linked whole.
+are not known here, and code is not counted: the CMake target `sizes` measures what is linked.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ class Budget:
 
 
 def _message_struct(message: Message, *, received: bool) -> tuple[int, int]:
-    return struct_size([*(scalar(s.c_type) for s in message.signals), *([scalar("bool")] if received else [])])
+    flags = 1 + len(message.multiplexed) if received else 0
+    return struct_size([*(scalar(s.c_type) for s in message.signals), *[scalar("bool")] * flags])
 
 
 def ram_bytes(table: Table, bus: Bus) -> int:
@@ -145,7 +146,7 @@ def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -
 
 
 def make_budget(table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> Budget:
-    """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (rule 3)."""
+    """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     return Budget(
         ram_bytes=ram_bytes(table, bus),
         flash_bytes=flash_bytes(table, bus),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import tempfile
@@ -172,19 +173,19 @@ def _exact(place: Place) -> str:
     return f"{_short(place)}:{place.column}"
 
 
-def render(application: Application) -> dict[str, str]:
-    """File name -> content. The same input gives the same bytes."""
-    environment = jinja2.Environment(
+def environment(bus: Bus) -> jinja2.Environment:
+    """The templates, with what they call."""
+    result = jinja2.Environment(
         loader=jinja2.PackageLoader("canopy.compiler"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
-    environment.globals |= {
+    result.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
+    result.globals |= {
         "codec": codec,
-        "stale_test": stale_test,
+        "stale_test": functools.partial(stale_test, bus),
         "parameters_of": parameters,
         "arguments_of": arguments,
         "prototypes_of": prototypes,
@@ -192,7 +193,22 @@ def render(application: Application) -> dict[str, str]:
         "setters": setters,
         "entry_type": entry_type,
         "TRACE": list(TRACE_LAYOUT),
+        "version": __version__,
     }
+    return result
+
+
+def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
+    """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
+    templates = environment(bus)
+    return {
+        f"{bus.name}_bus.{suffix}": templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        for suffix in ("h", "c")
+    }
+
+
+def render(application: Application) -> dict[str, str]:
+    """File name -> content. The same input gives the same bytes."""
     bindings = application.table.bindings
     texts = Texts()
     texts.all = list(bindings.texts) or [""]
@@ -200,21 +216,22 @@ def render(application: Application) -> dict[str, str]:
         "app": application,
         "table": application.table,
         "bus": application.bus,
-        "version": __version__,
         "entries": bindings.entries,
         "texts": bindings.texts,
         "queues": _queues(application.table),
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
-    bus, name = application.bus.name, application.name
+    name = application.name
     templates = {
-        f"{bus}_bus.h": "bus.h.j2",
-        f"{bus}_bus.c": "bus.c.j2",
         f"{name}_leaves.h": "leaves.h.j2",
         f"{name}_app.h": "application.h.j2",
         f"{name}_app.c": "application.c.j2",
     }
-    files = {file: environment.get_template(template).render(context) for file, template in templates.items()}
+    files = render_bus(application.bus, application.period_ms)
+    files |= {
+        file: environment(application.bus).get_template(template).render(context)
+        for file, template in templates.items()
+    }
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
     files[application.bus.path.name] = application.bus.path.read_text(encoding="cp1252")
     return files

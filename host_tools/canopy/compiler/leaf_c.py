@@ -6,15 +6,21 @@ from __future__ import annotations
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.leaf_model import Leaf, Port
-from canopy.compiler.names import snake
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
 
 
-def stale_test(leaf: Leaf) -> str:
-    """C: is a message that the leaf reads not fresh?"""
-    messages = sorted({name.partition(".")[0] for name in leaf.reads})
-    return " || ".join(f"!app->input.{snake(message)}.fresh" for message in messages)
+def stale_test(bus: Bus, leaf: Leaf) -> str:
+    """C: is something that the leaf reads not known? A multiplexed signal that it names must have come, too."""
+    flags = {(m.name, s.name): s.has_name for m in bus.receive for s in m.multiplexed}
+    names = {m.name: m.c_name for m in bus.receive}
+    reads = sorted(
+        {
+            (names[message], flags.get((message, signal), "fresh"))
+            for message, _, signal in (name.partition(".") for name in leaf.reads)
+        }
+    )
+    return " || ".join(f"!app->input.{message}.{flag}" for message, flag in reads)
 
 
 def parameters(leaf: Leaf, bus: Bus, before: str = "") -> str:

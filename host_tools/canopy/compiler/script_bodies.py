@@ -48,10 +48,12 @@ class Bodies:
     @staticmethod
     def _guard(compiler: Compiler) -> list[str]:
         """A script that reads a stale signal is not run, unless it asks for .fresh itself."""
-        names = sorted(message.c_name for name, message in compiler.used.items() if name not in compiler.tested)
-        if not names:
+        stale = [message for name, message in compiler.used.items() if name not in compiler.tested]
+        flags = sorted(f"app->input.{message.c_name}.fresh" for message in stale)
+        flags += sorted(compiler.parts)
+        if not flags:
             return []
-        tests = " || ".join(f"!app->input.{name}.fresh" for name in names)
+        tests = " || ".join(f"!{flag}" for flag in flags)
         return [f"if ({tests}) {{", "    return 0;", "}"]
 
     def _statements(self, compiler: Compiler, script: Script, statements: tuple[Expression, ...]) -> list[str]:

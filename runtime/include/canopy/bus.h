@@ -4,7 +4,7 @@
  * The application's side of the CAN bus: frames into the input image, the output image into frames.
  *
  * `canopy compile` makes the constant tables here from the DBC. A frame is checked from the outside in (arbitration id,
- * flags, length, CRC, counter, ranges of the values); one that fails changes nothing but a counter.
+ * flags, length, CRC, counter, ranges of the values); one that fails changes nothing that a leaf can see, but a counter.
  *
  * Threads: the loop's thread only.
  */
@@ -91,6 +91,12 @@ typedef struct {
     uint8_t *tx_counters;  /**< bus->tx_count E2E counters. */
     canopy_bus_counters_t counters;
 } canopy_bus_state_t;
+
+/** The sum, or the largest value where that is less. */
+static inline uint32_t canopy_sum(uint32_t a, uint32_t b)
+{
+    return a <= UINT32_MAX - b ? a + b : UINT32_MAX;
+}
 
 /** Adds one, and stays at the largest value instead of starting again at 0. */
 static inline void canopy_count(uint32_t *counter)

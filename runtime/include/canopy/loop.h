@@ -43,7 +43,7 @@ typedef struct {
 /** Numbers of the fault hook; stable. */
 typedef enum {
     CANOPY_FAULT_LEAF_STATUS = 1, /**< A leaf returned no valid status; detail: its node. */
-    CANOPY_FAULT_OVERRUN = 2,     /**< A cycle took longer than the period; detail: its length [us]. */
+    CANOPY_FAULT_OVERRUN = 2,     /**< A cycle was not done when the next was due; detail: its length [us]. */
     CANOPY_FAULT_CAN_RECEIVE = 3  /**< The driver's receive failed; detail: minus the canopy_error_t. */
 } canopy_fault_t;
 
@@ -65,11 +65,11 @@ typedef struct {
 
 #define CANOPY_LATENESS_BUCKETS 12u
 
-/** State and accounts of a loop. Counters saturate. */
+/** State and accounts of a loop. Counters saturate; `ticks` alone wraps around, for it also says which messages are due. */
 typedef struct {
     const canopy_loop_config_t *config;
     canopy_time_t deadline;      /**< When the next cycle is to start [us]. */
-    uint32_t ticks;              /**< Cycles done. */
+    uint32_t ticks;              /**< Cycles done, modulo 2^32. */
     uint32_t overruns;           /**< Cycles that were not done before the next was due. */
     uint32_t slips;              /**< Cycles left out after overruns; the phase is kept. */
     uint32_t rx_backlogs;        /**< Cycles that left frames waiting because of rx_max. */

@@ -21,6 +21,12 @@
 
 #include "canopy/tree.h"
 
+/**
+ * For what a tick needs seldom, or what has a large frame. Taken into the tick's loop it would push the loop's variables
+ * out of the registers, and a frame would stay on the stack while a leaf runs; the figures of `make bench` depend on it.
+ */
+#define CANOPY_SELDOM __attribute__((noinline))
+
 /** What to do next. Below CANOPY_STEP_DONE: tick this child. Else CANOPY_STEP_DONE + status: see canopy_done(). */
 typedef uint32_t canopy_step_t;
 
@@ -38,6 +44,12 @@ static inline bool canopy_resumes(const canopy_tree_instance_t *self, uint16_t n
     return self->status[node] == (uint8_t)CANOPY_RUNNING;
 }
 
+/** Does the node go on: was it RUNNING when this tick came to it, or SKIPPED and not reset since? */
+static inline bool canopy_goes_on(const canopy_tree_instance_t *self, uint16_t node)
+{
+    return self->status[node] == (uint8_t)CANOPY_RUNNING || self->status[node] == (uint8_t)CANOPY_SKIPPED;
+}
+
 /** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. */
 void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t node);
 
@@ -50,6 +62,15 @@ static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t chi
     self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
 }
 
+/** What a decorator does that only decides whether to tick its child: passes on the child's status. */
+static inline canopy_step_t canopy_pass_on(canopy_tree_instance_t *self, uint16_t child, canopy_status_t status)
+{
+    if (status != CANOPY_RUNNING) {
+        canopy_reset_child(self, child);
+    }
+    return canopy_done(status);
+}
+
 /** Resets the children from `first` to the last one of `node`. @return true when every one of them was SKIPPED. */
 static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t node, uint16_t first)
 {
@@ -59,7 +80,11 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
 
     for (uint16_t child = first; child != end; child = nodes[child].end) {
         all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
-        canopy_reset_child(self, child);
+        /* canopy_reset_child(), but not a call of its own: this is where the stack is deepest. */
+        if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
+            canopy_halt_subtree(self, child);
+        }
+        self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
     }
     return all_skipped;
 }

@@ -41,7 +41,7 @@ typedef struct {
     uint8_t asks;       /**< Bit i: parameter i is a script that gives the value in each tick. Else 0. */
     uint16_t parent;    /**< Index of the parent; the root names itself, 0. */
     uint16_t end;       /**< Index after the last descendant. */
-    uint16_t state;     /**< First of the node's state words; any value when the type has none. */
+    uint16_t state;     /**< First of its state words, after those of earlier nodes; any value if it has none. */
     uint16_t leaf;      /**< Your nodes: index in canopy_tree_t.leaves or .controls. Else 0. */
     uint16_t parameter; /**< Your nodes: which of the kind's uses this is. Else: first index in canopy_tree_t.parameters. */
 } canopy_node_t;
@@ -123,11 +123,12 @@ canopy_error_t canopy_tree_init(canopy_tree_instance_t *self, const canopy_tree_
                                 uint16_t *words, void *application);
 
 /**
- * Examines tables: structure, types, arities, and that every index lies in its table, so that no tick can leave them.
+ * Examines tables: structure, types, arities, that every index lies in its table and that no two nodes share a state
+ * word, so that no tick can leave them.
  *
  * @param tree the tables
  * @param bad_node when not NULL: receives the first node found wrong
- * @return CANOPY_OK or CANOPY_ERROR_TREE (CANOPY_ERROR_ARGUMENT when tree or a table is NULL). O(nodes * depth).
+ * @return CANOPY_OK or CANOPY_ERROR_TREE (CANOPY_ERROR_ARGUMENT when tree or a table is NULL). O(nodes).
  */
 canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_node);
 

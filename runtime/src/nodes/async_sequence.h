@@ -23,8 +23,9 @@ static inline canopy_step_t canopy_async_sequence_enter(canopy_tree_instance_t *
     return child;
 }
 
-static inline canopy_step_t canopy_async_sequence_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                        canopy_status_t status, canopy_status_t go_on)
+static CANOPY_SELDOM canopy_step_t canopy_async_sequence_child(canopy_tree_instance_t *self, uint16_t node,
+                                                               uint16_t child, canopy_status_t status,
+                                                               canopy_status_t go_on)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t *words = canopy_words(self, node);

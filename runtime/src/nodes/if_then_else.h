@@ -15,8 +15,8 @@ static inline canopy_step_t canopy_if_then_else_enter(canopy_tree_instance_t *se
     return canopy_resumes(self, node) ? *canopy_words(self, node) : node + 1u;
 }
 
-static inline canopy_step_t canopy_if_then_else_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                      canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_if_then_else_child(canopy_tree_instance_t *self, uint16_t node,
+                                                             uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t condition = (uint16_t)(node + 1u);

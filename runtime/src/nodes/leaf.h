@@ -17,16 +17,27 @@ static inline const canopy_leaf_t *canopy_leaf(const canopy_tree_instance_t *sel
     return &self->tree->leaves[self->tree->nodes[node].leaf];
 }
 
+/** Condition or SyncAction: a leaf that has no state and is never RUNNING. */
+static inline bool canopy_is_simple_leaf(const canopy_node_t *node)
+{
+    return node->type <= (uint8_t)CANOPY_NODE_SYNC_ACTION;
+}
+
+/** Rule 7 for a Condition or SyncAction: what counts when it has returned `status`. */
+static inline canopy_status_t canopy_leaf_checked(canopy_tree_instance_t *self, uint16_t node, canopy_status_t status)
+{
+    if ((unsigned)status - (unsigned)CANOPY_SUCCESS > (unsigned)CANOPY_SKIPPED - (unsigned)CANOPY_SUCCESS) {
+        return canopy_leaf_fault(self, node);
+    }
+    return status;
+}
+
 /** Condition and SyncAction. */
 static inline canopy_step_t canopy_leaf_enter(canopy_tree_instance_t *self, uint16_t node)
 {
-    canopy_status_t status =
-        canopy_leaf(self, node)->tick(self->application, self->tree->nodes[node].parameter);
+    canopy_status_t status = canopy_leaf(self, node)->tick(self->application, self->tree->nodes[node].parameter);
 
-    if ((unsigned)status - (unsigned)CANOPY_SUCCESS > (unsigned)CANOPY_SKIPPED - (unsigned)CANOPY_SUCCESS) {
-        status = canopy_leaf_fault(self, node);
-    }
-    return canopy_done(status);
+    return canopy_done(canopy_leaf_checked(self, node, status));
 }
 
 static inline canopy_step_t canopy_stateful_action_enter(canopy_tree_instance_t *self, uint16_t node)

@@ -2,7 +2,8 @@
 /**
  * @file
  * Parallel: ticks the children that have not completed; what has completed is remembered, by its status, while the node
- * is RUNNING. The thresholds are tested after each child.
+ * is RUNNING. The thresholds are tested after each child; only when neither is met can all children be SKIPPED, and with
+ * a negative success_count, for which they count as successes, never.
  *
  * State: successes and failures so far; children SKIPPED in this tick; how many children there are.
  */
@@ -23,8 +24,8 @@ static inline uint16_t canopy_parallel_open_child(const canopy_tree_instance_t *
 {
     const canopy_node_t *nodes = self->tree->nodes;
 
-    while (child != nodes[node].end && (self->status[child] == (uint8_t)CANOPY_SUCCESS ||
-                                        self->status[child] == (uint8_t)CANOPY_FAILURE)) {
+    while (child != nodes[node].end &&
+           (self->status[child] == (uint8_t)CANOPY_SUCCESS || self->status[child] == (uint8_t)CANOPY_FAILURE)) {
         child = nodes[child].end;
     }
     return child;
@@ -61,8 +62,8 @@ static inline canopy_status_t canopy_parallel_verdict(canopy_tree_instance_t *se
     return failures >= failures_needed || children - failures < successes_needed ? CANOPY_FAILURE : CANOPY_RUNNING;
 }
 
-static inline canopy_step_t canopy_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                  canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                         canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t *words = canopy_words(self, node);
@@ -76,11 +77,16 @@ static inline canopy_step_t canopy_parallel_child(canopy_tree_instance_t *self, 
     } else if (status == CANOPY_SKIPPED) {
         words[CANOPY_PARALLEL_SKIPPED]++;
     }
+    verdict = canopy_parallel_verdict(self, node);
     next = canopy_parallel_open_child(self, node, nodes[child].end);
-    verdict = words[CANOPY_PARALLEL_SKIPPED] == words[CANOPY_PARALLEL_CHILDREN] ? CANOPY_SKIPPED
-                                                                                : canopy_parallel_verdict(self, node);
+    if (verdict == CANOPY_RUNNING && next != nodes[node].end) {
+        return next;
+    }
+    if (verdict == CANOPY_RUNNING && words[CANOPY_PARALLEL_SKIPPED] != words[CANOPY_PARALLEL_CHILDREN]) {
+        return canopy_done(CANOPY_RUNNING);
+    }
     if (verdict == CANOPY_RUNNING) {
-        return next != nodes[node].end ? next : canopy_done(CANOPY_RUNNING);
+        verdict = CANOPY_SKIPPED;
     }
     (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
     return canopy_done(verdict);

@@ -14,7 +14,8 @@ static inline canopy_step_t canopy_parallel_all_enter(const canopy_tree_instance
     return canopy_resumes(self, node) ? canopy_parallel_open_child(self, node, (uint16_t)(node + 1u)) : node + 1u;
 }
 
-static inline canopy_step_t canopy_parallel_all_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child)
+static CANOPY_SELDOM canopy_step_t canopy_parallel_all_child(canopy_tree_instance_t *self, uint16_t node,
+                                                             uint16_t child)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t next = canopy_parallel_open_child(self, node, nodes[child].end);

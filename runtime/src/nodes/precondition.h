@@ -21,13 +21,4 @@ static inline canopy_step_t canopy_precondition_enter(canopy_tree_instance_t *se
     return canopy_done((canopy_status_t)canopy_parameter(self, node, CANOPY_PRECONDITION_ELSE));
 }
 
-/** Passes on what the child returned; also for the other decorators that only decide whether to tick it. */
-static inline canopy_step_t canopy_pass_on(canopy_tree_instance_t *self, uint16_t child, canopy_status_t status)
-{
-    if (status != CANOPY_RUNNING) {
-        canopy_reset_child(self, child);
-    }
-    return canopy_done(status);
-}
-
 #endif

@@ -3,7 +3,7 @@
  * @file
  * ReactiveParallel: the paper's Parallel (Algorithm 3). All N children are ticked in every tick, then counted.
  *
- * M = success_count; a negative one counts from N + 1 down (-1: all). A SKIPPED child is taken off N.
+ * M = success_count, at least 1; a negative one counts from N + 1 down (-1: all). A SKIPPED child is taken off N.
  * SUCCESS with at least M successes; FAILURE with more than N - M failures; else RUNNING. No state.
  */
 #ifndef CANOPY_NODES_REACTIVE_PARALLEL_H
@@ -17,7 +17,7 @@ static inline canopy_step_t canopy_reactive_parallel_enter(uint16_t node)
 }
 
 /** Algorithm 3's verdict over children that have all been ticked. */
-static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree_instance_t *self, uint16_t node)
+static CANOPY_SELDOM canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree_instance_t *self, uint16_t node)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     int32_t counts[CANOPY_SKIPPED + 1] = {0};
@@ -33,13 +33,15 @@ static inline canopy_status_t canopy_reactive_parallel_verdict(const canopy_tree
     }
     children -= counts[CANOPY_SKIPPED];
     needed = canopy_threshold(canopy_parameter(self, node, 0), children);
+    needed = needed > 1 ? needed : 1;
     if (counts[CANOPY_SUCCESS] >= needed) {
         return CANOPY_SUCCESS;
     }
     return counts[CANOPY_FAILURE] > children - needed ? CANOPY_FAILURE : CANOPY_RUNNING;
 }
 
-static inline canopy_step_t canopy_reactive_parallel_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child)
+static CANOPY_SELDOM canopy_step_t canopy_reactive_parallel_child(canopy_tree_instance_t *self, uint16_t node,
+                                                                  uint16_t child)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     canopy_status_t verdict;

@@ -5,16 +5,18 @@
  * 3: a tick visits a node at most once), RUNNING between cycles.
  *
  * A child that returns `again` is ticked again, `most` times in all (-1: for ever, 0: not at all); the other result ends
- * it. State: cycles done, 32 bit. A SKIPPED child keeps the count; completing and halting clear it.
+ * it. State: cycles done, 32 bit; it counts on while the node goes on, through a SKIPPED child too.
  */
 #ifndef CANOPY_NODES_REPEAT_H
 #define CANOPY_NODES_REPEAT_H
 
 #include "../state.h"
 
-static inline canopy_step_t canopy_repeat_enter(const canopy_tree_instance_t *self, uint16_t node,
-                                                canopy_status_t again)
+static inline canopy_step_t canopy_repeat_enter(canopy_tree_instance_t *self, uint16_t node, canopy_status_t again)
 {
+    if (!canopy_goes_on(self, node)) {
+        canopy_set32(canopy_words(self, node), 0u);
+    }
     return canopy_parameter(self, node, 0) == 0 ? canopy_done(again) : node + 1u;
 }
 
@@ -39,13 +41,7 @@ static inline canopy_step_t canopy_repeat_child(canopy_tree_instance_t *self, ui
         canopy_set32(canopy_words(self, node), cycles);
         return canopy_done(CANOPY_RUNNING);
     }
-    canopy_set32(canopy_words(self, node), 0u);
     return canopy_done(status);
-}
-
-static inline void canopy_repeat_halt(canopy_tree_instance_t *self, uint16_t node)
-{
-    canopy_set32(canopy_words(self, node), 0u);
 }
 
 #endif

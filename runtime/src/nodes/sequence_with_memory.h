@@ -17,8 +17,8 @@ static inline canopy_step_t canopy_sequence_with_memory_enter(canopy_tree_instan
     return child != 0u ? child : node + 1u;
 }
 
-static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
-                                                              uint16_t child, canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instance_t *self, uint16_t node,
+                                                                     uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     bool all_skipped;
@@ -26,7 +26,7 @@ static inline canopy_step_t canopy_sequence_with_memory_child(canopy_tree_instan
     if (status == CANOPY_RUNNING || status == CANOPY_FAILURE) {
         *canopy_words(self, node) = child;
         if (status == CANOPY_FAILURE) {
-            (void)canopy_reset_children(self, node, child);
+            (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
         }
         return canopy_done(status);
     }

@@ -27,8 +27,8 @@ static inline canopy_step_t canopy_switch_enter(canopy_tree_instance_t *self, ui
     return child;
 }
 
-static inline canopy_step_t canopy_switch_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_switch_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                       canopy_status_t status)
 {
     if (status == CANOPY_RUNNING) {
         *canopy_words(self, node) = child;

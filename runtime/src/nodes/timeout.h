@@ -10,7 +10,7 @@
 
 #include "../state.h"
 
-static inline canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, uint16_t node)
+static CANOPY_SELDOM canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, uint16_t node)
 {
     uint16_t child = (uint16_t)(node + 1u);
 
@@ -21,14 +21,6 @@ static inline canopy_step_t canopy_timeout_enter(canopy_tree_instance_t *self, u
         return canopy_done(CANOPY_FAILURE);
     }
     return child;
-}
-
-static inline canopy_step_t canopy_timeout_child(canopy_tree_instance_t *self, uint16_t child, canopy_status_t status)
-{
-    if (status != CANOPY_RUNNING) {
-        canopy_reset_child(self, child);
-    }
-    return canopy_done(status);
 }
 
 #endif

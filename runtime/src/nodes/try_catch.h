@@ -28,8 +28,8 @@ static inline uint16_t canopy_try_catch_handler(const canopy_tree_instance_t *se
     return child;
 }
 
-static inline canopy_step_t canopy_try_catch_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                   canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_try_catch_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                          canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t first = (uint16_t)(node + 1u);

@@ -37,8 +37,8 @@ static inline canopy_step_t canopy_user_enter(canopy_tree_instance_t *self, uint
     return canopy_user_checked(self, node, node, canopy_user_control(self, node)->enter(self, node));
 }
 
-static inline canopy_step_t canopy_user_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                              canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_user_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
+                                                     canopy_status_t status)
 {
     return canopy_user_checked(self, node, child, canopy_user_control(self, node)->child(self, node, child, status));
 }

@@ -14,8 +14,8 @@ static inline canopy_step_t canopy_while_do_else_enter(uint16_t node)
     return node + 1u;
 }
 
-static inline canopy_step_t canopy_while_do_else_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
-                                                       canopy_status_t status)
+static CANOPY_SELDOM canopy_step_t canopy_while_do_else_child(canopy_tree_instance_t *self, uint16_t node,
+                                                              uint16_t child, canopy_status_t status)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t condition = (uint16_t)(node + 1u);

@@ -11,5 +11,6 @@
 #define UNITY_OUTPUT_CHAR(character) semihosting_put_char((char)(character))
 #define UNITY_OUTPUT_FLUSH() semihosting_flush()
 #define UNITY_EXCLUDE_FLOAT
+#define UNITY_EXCLUDE_MATH_H
 
 #endif

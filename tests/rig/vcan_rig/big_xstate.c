@@ -3,12 +3,12 @@
  * @file
  * Preloaded into User-Mode Linux: makes it work on processors with much register state (Intel AMX: 11 KB).
  *
- * UML up to 6.12 keeps room for the state of AVX-512 only. The host's kernel takes a PTRACE_SETREGSET of the extended
- * state at its full size or not at all, so on such a processor the guest's first process dies. Here a state that is too
- * short is laid over what the process has now, and set at full size. The rest, AMX, is then not switched between threads
- * of the guest; nothing in it uses that.
+ * UML 6.1 keeps room for the state of AVX-512 only. The host's kernel takes a PTRACE_SETREGSET of the extended state at
+ * its full size or not at all, so on such a processor the guest's first process dies. Here a state that is too short is
+ * laid over what the process has now, and set at full size. The rest, AMX, is then not switched between threads of the
+ * guest; nothing in it uses that.
  */
-#define _GNU_SOURCE
+#define _GNU_SOURCE /* NOLINT: the name is the C library's; for RTLD_NEXT */
 #include <dlfcn.h>
 #include <elf.h>
 #include <errno.h>
@@ -21,9 +21,9 @@
 /* Linux's largest is 11008 bytes so far. */
 enum { ROOM = 65536 };
 
-typedef long (*ptrace_function)(int request, pid_t process, void *address, void *data);
+typedef long (*ptrace_function_t)(int request, pid_t process, void *address, void *data);
 
-static long set_full_state(ptrace_function next, pid_t process, void *address, const struct iovec *given)
+static long set_full_state(ptrace_function_t next, pid_t process, void *address, const struct iovec *given)
 {
     static _Alignas(64) char state[ROOM]; /* the guest's kernel is one thread */
     struct iovec full = {.iov_base = state, .iov_len = sizeof(state)};
@@ -41,7 +41,7 @@ static long set_full_state(ptrace_function next, pid_t process, void *address, c
 
 long ptrace(enum __ptrace_request request, ...)
 {
-    static ptrace_function next;
+    static ptrace_function_t next;
     va_list arguments;
 
     va_start(arguments, request);

@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def memory_folder(size: int) -> Path | None:
-    """A folder for the unlinked file that is the guest's RAM: executable, with room for `size` bytes. None: no such."""
+    """A folder for the unlinked file that is the guest's RAM, executable, with room for `size` bytes; None: no such."""
     for folder in ("/dev/shm", os.environ.get("TMPDIR") or "/tmp", "/var/tmp"):
         if not os.access(folder, os.W_OK):
             continue

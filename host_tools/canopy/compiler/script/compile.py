@@ -70,7 +70,10 @@ def guess(text: str) -> Const | TextConst:
 
 
 class Compiler:
-    """Compiles the expressions of one script. `used`: the messages it reads; `tested`: those it asks for `.fresh`."""
+    """Compiles the expressions of one script.
+
+    `used`: the messages it reads; `tested`: those it asks for `.fresh`; `parts`: C flags of multiplexed signals.
+    """
 
     def __init__(self, scope: Scope, place: Place, bus: Bus, texts: Texts, floats: bool) -> None:
         self.scope = scope
@@ -80,6 +83,7 @@ class Compiler:
         self._arithmetic = Arithmetic(floats, FAULTS, texts.index)
         self.used: dict[str, Message] = {}
         self.tested: set[str] = set()
+        self.parts: set[str] = set()
 
     # Values
 
@@ -195,6 +199,8 @@ class Compiler:
             return Num(f"{member}.fresh", "bool", 0, 1, is_bool=True)
         signal = self._signal(message, signal_name, index)
         self.used[message.name] = message
+        if signal in message.multiplexed:
+            self.parts.add(f"{member}.{signal.has_name}")
         c = f"{member}.{signal.c_name}"
         if signal.is_bool:
             return Num(c, "bool", 0, 1, is_bool=True)
@@ -206,6 +212,8 @@ class Compiler:
 
     def _signal(self, message: Message, name: str, index: int) -> Signal:
         for signal in message.signals:
+            if signal.name == name and signal.is_float:
+                raise ScriptError(index, f"'{message.name}.{name}' is a float, which scripts cannot use", "use a leaf")
             if signal.name == name:
                 return signal
         known = ["fresh", *(signal.name for signal in message.signals)]
@@ -321,14 +329,14 @@ class Compiler:
             )
         value = self.evaluate(expression.value)
         setter = f"{self._bus.name}_set_{message.c_name}_{signal.c_name}"
-        c = self._raw(value, signal, expression.value.index, text)
+        c = self._raw(value, message, signal, expression.value.index, text)
         return [f"{setter}(&app->output, {stripped(c)});"]
 
-    def _raw(self, value: Value, signal: Signal, index: int, text: str) -> str:
+    def _raw(self, value: Value, message: Message, signal: Signal, index: int, text: str) -> str:
         """The C expression of a raw value, of the setter's type."""
         if signal.choices:
             names = {name: raw for raw, name in signal.choices}
-            enum = f"{self._bus.name}_{snake(text.partition('.')[0])}_{signal.c_name}"
+            enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}"
             if isinstance(value, TextConst):
                 if value.text not in names:
                     raise ScriptError(index, f"'{value.text}' is no value of '{text}'", nearest(value.text, names))

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Counts a tick's instructions and stack on an emulated Cortex-M4 (unicorn)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import unicorn
+from elftools.elf.elffile import ELFFile
+from unicorn import arm_const
+
+CODE_START, CODE_SIZE = 0x0000_0000, 0x0010_0000
+DATA_START, DATA_SIZE = 0x2000_0000, 0x0040_0000
+STACK_TOP = DATA_START + DATA_SIZE
+# An address that holds no code of the program: the call returns there.
+RETURN_TO = CODE_START + CODE_SIZE - 4
+
+
+@dataclass(frozen=True)
+class Tick:
+    """One call of canopy_tree_tick()."""
+
+    instructions: int
+    leaf_calls: int
+    stack: int  # [bytes], the leaves' own included; those of the workloads have none
+
+
+class Core:
+    """A core with a program of build.bare_program() in its memory."""
+
+    def __init__(self, program: Path) -> None:
+        self._machine = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+        self._machine.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        self._machine.mem_map(CODE_START, CODE_SIZE)
+        self._machine.mem_map(DATA_START, DATA_SIZE)
+        with program.open("rb") as file:
+            elf = ELFFile(file)
+            for segment in elf.iter_segments("PT_LOAD"):
+                self._machine.mem_write(segment["p_vaddr"], segment.data())
+            table = elf.get_section_by_name(".symtab")
+            self._symbols = {symbol.name: int(symbol["st_value"]) for symbol in table.iter_symbols()}
+
+    def build(self, workload: int, n: int) -> int:
+        """Calls bench_build(). Returns the number of nodes."""
+        return self._call("bench_build", workload, n)
+
+    def tick(self, now: int, count: bool = True) -> Tick:
+        """Calls canopy_tree_tick() at `now` [us].
+
+        The stack goes down to the lowest stack pointer that a basic block starts with: a call starts a block, so every
+        frame is seen that was there when something was called. Counting instructions is slow, some 500,000 a second.
+        """
+        calls = self._word("bench_leaf_calls")
+        instructions = 0
+        lowest = STACK_TOP
+
+        def block(machine: unicorn.Uc, _address: int, _size: int, _data: object) -> None:
+            nonlocal lowest
+            lowest = min(lowest, machine.reg_read(arm_const.UC_ARM_REG_SP))
+
+        def step(_machine: unicorn.Uc, _address: int, _size: int, _data: object) -> None:
+            nonlocal instructions
+            instructions += 1
+
+        hooks = [self._machine.hook_add(unicorn.UC_HOOK_BLOCK, block)]
+        if count:
+            hooks.append(self._machine.hook_add(unicorn.UC_HOOK_CODE, step))
+        # AAPCS: a 64-bit argument takes an even pair of registers, here r2 and r3.
+        self._call("canopy_tree_tick", self._symbols["bench_instance"], 0, now & 0xFFFF_FFFF, now >> 32)
+        for hook in hooks:
+            self._machine.hook_del(hook)
+        return Tick(instructions, self._word("bench_leaf_calls") - calls, STACK_TOP - lowest)
+
+    def _word(self, symbol: str) -> int:
+        return int.from_bytes(self._machine.mem_read(self._symbols[symbol], 4), "little")
+
+    def _call(self, function: str, *arguments: int) -> int:
+        for register, value in enumerate(arguments):
+            self._machine.reg_write(arm_const.UC_ARM_REG_R0 + register, value)
+        self._machine.reg_write(arm_const.UC_ARM_REG_SP, STACK_TOP)
+        self._machine.reg_write(arm_const.UC_ARM_REG_LR, RETURN_TO | 1)
+        self._machine.emu_start(self._symbols[function] | 1, RETURN_TO)
+        return int(self._machine.reg_read(arm_const.UC_ARM_REG_R0))

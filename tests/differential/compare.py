@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""Compares runs of the engine, of the model, and of BehaviorTree.CPP, tick by tick."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from differential.differences import Explained, run_differing_model, shown_alike
+from differential.engine import run_engine
+from differential.model import run_model
+from differential.shrink import shrink
+from differential.tree import CALL_NAMES, STATUS_NAMES, Outcome, Result, Tree, code_name, engine_kinds
+
+BATCH = 500
+
+
+@dataclass
+class Report:
+    """What was compared. `direct`: ticks of BehaviorTree.CPP compared with the engine (or the model) itself."""
+
+    trees: int = 0
+    ticks: int = 0
+    direct: int = 0
+    thrown: int = 0
+    first_rules: Counter[str] = field(default_factory=Counter)
+    failures: list[tuple[Tree, str]] = field(default_factory=list)
+
+
+def outcome_text(outcome: Outcome) -> str:
+    """One tick in words."""
+    if outcome.status is None:
+        head = "halt of the tree"
+    else:
+        head = STATUS_NAMES[outcome.status] if outcome.status < len(STATUS_NAMES) else f"status {outcome.status}"
+    calls = ", ".join(f"{node} {CALL_NAMES[kind]}" for node, kind in outcome.calls)
+    return f"{head}; calls: {calls or 'none'}; nodes: {', '.join(map(code_name, outcome.codes))}"
+
+
+def first_difference(named: dict[str, list[Outcome]]) -> str | None:
+    """Where two runs part, in words; None when they are the same."""
+    (one, ones), (other, others) = named.items()
+    for number, (mine, theirs) in enumerate(zip(ones, others, strict=False)):
+        if mine != theirs:
+            before = f"\n  before: {outcome_text(ones[number - 1])}" if number else ""
+            return f"outcome {number}:\n  {one}: {outcome_text(mine)}\n  {other}: {outcome_text(theirs)}{before}"
+    if len(ones) != len(others):
+        return f"{one} gave {len(ones)} outcomes, {other} {len(others)}"
+    return None
+
+
+# --- The engine and the model -----------------------------------------------------------------------------------------
+
+Model = Callable[[Tree], Result]
+
+
+def engine_against_model(runner: Path, tree: Tree, model: Model = run_model) -> str | None:
+    """How the engine differs from the model on one tree."""
+    return _engine_difference(run_engine(runner, [tree])[0], model(tree))
+
+
+def _engine_difference(engine: Result, model: Result) -> str | None:
+    if engine == model:
+        return None
+    faults = f"faults: engine {engine.faults} (last: node {engine.fault_node}), "
+    faults += f"model {model.faults} (last: node {model.fault_node})"
+    return first_difference({"engine": engine.outcomes, "model": model.outcomes}) or faults
+
+
+def compare_with_model(runner: Path, trees: list[Tree], model: Model = run_model) -> Report:
+    """Runs trees in the engine and in the model."""
+    report = Report()
+    for begin in range(0, len(trees), BATCH):
+        batch = trees[begin : begin + BATCH]
+        for tree, engine in zip(batch, run_engine(runner, batch), strict=True):
+            expected = model(tree)
+            report.trees += 1
+            report.ticks += len(expected.outcomes)
+            difference = _engine_difference(engine, expected)
+            if difference:
+                report.failures.append((tree, difference))
+    return report
+
+
+# --- BehaviorTree.CPP -------------------------------------------------------------------------------------------------
+
+Differing = Callable[[Tree], Explained]
+
+
+def run_btcpp(trees: list[Tree]) -> list[tuple[list[Outcome], str]]:
+    """Runs trees in BehaviorTree.CPP: for each the outcomes, and the message of the exception that ended it, or ""."""
+    folder = str(Path(__file__).parents[1])
+    process = subprocess.run(
+        [sys.executable, "-m", "differential.btcpp_runner"],
+        input=pickle.dumps(trees),
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([folder, os.environ.get("PYTHONPATH", "")])},
+        check=True,
+        timeout=600,
+    )
+    results: list[tuple[list[Outcome], str]] = pickle.loads(process.stdout)
+    return results
+
+
+def _directly_compared(tree: Tree, explained: Explained, ours: list[Outcome], theirs: list[Outcome]) -> int | str:
+    """Number of outcomes before the first rule fired, all found alike; else the first that is not, in words."""
+    for number, (our, their) in enumerate(zip(ours, theirs, strict=False)):
+        if explained.fired[number]:
+            return number
+        alike = our.status == their.status and our.calls == their.calls and shown_alike(tree, our, their)
+        if not alike:
+            return (
+                f"outcome {number}, no rule fired:\n  engine: {outcome_text(our)}\n"
+                f"  BehaviorTree.CPP: {outcome_text(their)}"
+            )
+    return min(len(ours), len(theirs))
+
+
+def compare_with_btcpp(runner: Path, trees: list[Tree], differing: Differing = run_differing_model) -> Report:
+    """Runs trees in BehaviorTree.CPP, the differing model, and the engine (the model where it lacks a node)."""
+    report = Report()
+    for begin in range(0, len(trees), BATCH):
+        batch = trees[begin : begin + BATCH]
+        for_engine = [tree for tree in batch if tree.kinds() <= engine_kinds()]
+        engine = iter(run_engine(runner, for_engine))
+        for tree, (theirs, thrown) in zip(batch, run_btcpp(batch), strict=True):
+            ours = (next(engine) if tree.kinds() <= engine_kinds() else run_model(tree)).outcomes
+            explained = differing(tree)
+            report.trees += 1
+            report.ticks += len(theirs)
+            report.thrown += bool(thrown)
+            report.first_rules.update(next((fired for fired in explained.fired if fired), ()))
+            difference = first_difference({"BehaviorTree.CPP": theirs, "expected of it": explained.outcomes})
+            if difference is None and bool(thrown) != explained.thrown:
+                difference = f"BehaviorTree.CPP threw {thrown!r}; an exception was expected: {explained.thrown}"
+            compared = _directly_compared(tree, explained, ours, theirs)
+            if difference is None and isinstance(compared, str):
+                difference = compared
+            if difference:
+                report.failures.append((tree, difference))
+            elif isinstance(compared, int):
+                report.direct += compared
+    return report
+
+
+# --- What a failure says ----------------------------------------------------------------------------------------------
+
+
+def smallest_failure(report: Report, difference: Callable[[Tree], str | None]) -> tuple[Tree, str]:
+    """The smallest tree that still fails, made from the smallest of the failures, and how it fails."""
+    tree = min((tree for tree, _ in report.failures), key=lambda tree: sum(1 for _ in tree.root.walk()))
+    tree = shrink(tree, lambda smaller: difference(smaller) is not None)
+    return tree, difference(tree) or "(it failed once, and now it does not)"

@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: MIT
+"""BehaviorTree.CPP as this project knows it: the reference model, changed by nothing but the listed differences.
+
+A class overrides exactly the place where BehaviorTree.CPP acts otherwise, and calls `differs` in the ticks in which
+that changes what happens. A run of BehaviorTree.CPP is explained when this model gives the same; and up to the first
+tick in which a rule fired, the engine has to give the same as BehaviorTree.CPP, too. docs/differential.md lists them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from differential import model
+from differential.model import COMPLETED, ModelTree, Node, World
+from differential.tree import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, WAS, Outcome, Spec, Tree
+
+RULES: dict[str, str] = {
+    "skipped condition": "IfThenElse and WhileDoElse throw when their condition is SKIPPED",
+    "no else": "a two-child IfThenElse does not reset its condition after a FAILURE, nor ask a stateful one again",
+    "while": "WhileDoElse does not ask a stateful condition again that has completed, until its branch is done",
+    "keep running": "KeepRunningUntilFailure turns a SKIPPED child into RUNNING",
+    "same tick": "Repeat and RetryUntilSuccessful begin the next cycle in the tick that ends an asynchronous one",
+    "memory yields": "SequenceWithMemory yields after every child that completes in the tick it was started in",
+    "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there, and loses its count at other times",
+    "skipped action": "a RUNNING action that answers SKIPPED stays RUNNING there",
+    "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped then",
+}
+"""The differences that change what happens. What only looks different is in shown_alike()."""
+
+
+class ThrownError(Exception):
+    """BehaviorTree.CPP throws an exception in this tick."""
+
+
+class BtCppWorld(World):
+    """Notes which rules fired in the tick under way."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fired: set[str] = set()
+
+    def differs(self, rule: str) -> None:
+        assert rule in RULES
+        self.fired.add(rule)
+
+
+class BtCppNode(Node):
+    """SKIPPED is not stored: a leaf stays what it was, and an inner node stays RUNNING."""
+
+    world: BtCppWorld
+    was_skipped = False
+
+    def tick(self) -> int:
+        status = self.tick_children()
+        self.was_skipped = status == SKIPPED
+        if status != SKIPPED:
+            self.code = status
+        elif self.children:
+            self.code = RUNNING
+        return status
+
+    def reset(self) -> None:
+        if self.code == RUNNING:
+            self.on_halt()
+        self.code = IDLE
+
+
+class Condition(BtCppNode, model.Condition):
+    pass
+
+
+class SyncAction(BtCppNode, model.SyncAction):
+    def tick(self) -> int:
+        self.code = self.tick_children()  # of all nodes, this one stores SKIPPED
+        return self.code
+
+
+class StatefulAction(BtCppNode, model.StatefulAction):
+    def tick_children(self) -> int:
+        if self.code in COMPLETED:
+            return self.code  # it was not reset: see "no else" and "while"
+        status = super().tick_children()
+        if status == SKIPPED and self.code == RUNNING:
+            self.world.differs("skipped action")
+        return status
+
+
+class AlwaysSuccess(BtCppNode, model.AlwaysSuccess):
+    pass
+
+
+class AlwaysFailure(BtCppNode, model.AlwaysFailure):
+    pass
+
+
+class InOrder(BtCppNode, model.InOrder):
+    def tick_children(self) -> int:
+        if self.code == IDLE:
+            self.skipped = 0
+        elif self.code in COMPLETED and self.skipped:
+            self.world.differs("stale skips")
+        return super().tick_children()
+
+    def ended_by(self, status: int) -> int:
+        skipped = self.skipped
+        status = super().ended_by(status)
+        self.skipped = skipped
+        return status
+
+
+class Sequence(InOrder, model.Sequence):
+    pass
+
+
+class AsyncSequence(InOrder, model.AsyncSequence):
+    pass
+
+
+class SequenceWithMemory(InOrder, model.SequenceWithMemory):
+    def ended_by(self, status: int) -> int:
+        for child in self.children[self.index :]:
+            child.reset()
+        return status
+
+    def yields_now(self) -> bool:
+        self.world.differs("memory yields")
+        return True
+
+
+class Fallback(InOrder, model.Fallback):
+    pass
+
+
+class AsyncFallback(InOrder, model.AsyncFallback):
+    pass
+
+
+class Reactive(BtCppNode, model.Reactive):
+    """All children but the RUNNING one become IDLE, not only those that were RUNNING. This is only shown."""
+
+    def tick_children(self) -> int:
+        all_skipped = True
+        for child in self.children:
+            status = child.tick()
+            if status == SKIPPED:
+                child.reset()
+                continue
+            all_skipped = False
+            if status == RUNNING:
+                for other in self.children:
+                    if other is not child:
+                        other.reset()
+                return RUNNING
+            if status != self.go_on:
+                self.reset_all()
+                return status
+        self.reset_all()
+        return SKIPPED if all_skipped else self.go_on
+
+
+class ReactiveSequence(Reactive, model.ReactiveSequence):
+    pass
+
+
+class ReactiveFallback(Reactive, model.ReactiveFallback):
+    pass
+
+
+class Remembering(BtCppNode, model.Remembering):
+    """One that is SKIPPED does not reset its children. This is only shown."""
+
+    def complete(self, status: int) -> int:
+        return status if status == SKIPPED else super().complete(status)
+
+
+class Parallel(Remembering, model.Parallel):
+    pass
+
+
+class ParallelAll(Remembering, model.ParallelAll):
+    pass
+
+
+class IfThenElse(BtCppNode, model.IfThenElse):
+    def tick_children(self) -> int:
+        if self.branch == 0 and isinstance(self.children[0], StatefulAction) and self.children[0].code in COMPLETED:
+            self.world.differs("no else")
+        return super().tick_children()
+
+    def condition_skipped(self) -> int:
+        self.world.differs("skipped condition")
+        raise ThrownError
+
+    def no_else(self) -> int:
+        self.begin()
+        return FAILURE
+
+
+class WhileDoElse(BtCppNode, model.WhileDoElse):
+    def tick_children(self) -> int:
+        if isinstance(self.children[0], StatefulAction) and self.children[0].code in COMPLETED:
+            self.world.differs("while")
+        return super().tick_children()
+
+    def condition_skipped(self) -> int:
+        self.world.differs("skipped condition")
+        raise ThrownError
+
+
+class Decorator(BtCppNode, model.Decorator):
+    def tick_child(self) -> int:
+        child = self.children[0]
+        status = child.tick()
+        if status in COMPLETED:
+            self.reset_all()
+        elif status == SKIPPED and isinstance(child, Counting) and child.cycles:
+            self.world.differs("skipped count")
+        return status
+
+
+class Inverter(Decorator, model.Inverter):
+    pass
+
+
+class ForceSuccess(Decorator, model.ForceSuccess):
+    pass
+
+
+class ForceFailure(Decorator, model.ForceFailure):
+    pass
+
+
+class Counting(Decorator, model.Counting):
+    def tick_children(self) -> int:
+        while True:
+            asynchronous = self.children[0].code != IDLE
+            cycles = self.cycles
+            status = super().tick_children()
+            if status == SKIPPED:
+                self.reset_all()
+            if not (asynchronous and self.cycles > cycles and status == RUNNING):
+                return status
+            self.world.differs("same tick")
+
+    def on_halt(self) -> None:
+        if self.was_skipped and self.cycles:
+            self.world.differs("skipped count")
+        super().on_halt()
+
+
+class Repeat(Counting, model.Repeat):
+    pass
+
+
+class RetryUntilSuccessful(Counting, model.RetryUntilSuccessful):
+    pass
+
+
+class KeepRunningUntilFailure(Decorator, model.KeepRunningUntilFailure):
+    def tick_children(self) -> int:
+        status = super().tick_children()
+        if status != SKIPPED:
+            return status
+        self.world.differs("keep running")
+        return RUNNING
+
+
+class RunOnce(Decorator, model.RunOnce):
+    def tick(self) -> int:
+        before = self.code
+        remembered = self.remembered is not None
+        status = super().tick()
+        if remembered and status == SKIPPED:
+            self.code = before
+        return status
+
+
+NODES: dict[str, type[Node]] = {
+    node.__name__: node
+    for node in (
+        Condition, SyncAction, StatefulAction, AlwaysSuccess, AlwaysFailure,
+        Sequence, SequenceWithMemory, AsyncSequence, ReactiveSequence, Fallback, AsyncFallback, ReactiveFallback,
+        Parallel, ParallelAll, IfThenElse, WhileDoElse,
+        Inverter, ForceSuccess, ForceFailure, Repeat, RetryUntilSuccessful, KeepRunningUntilFailure, RunOnce,
+    )
+}  # fmt: skip
+"""The kinds of nodes that can be compared. It has no ReactiveParallel, and cannot be given a clock (Delay, Timeout,
+Sleep); TryCatch is newer (4.9) than what behaviortreepy holds (4.8.2)."""
+
+
+@dataclass
+class Explained:
+    """What BehaviorTree.CPP has to give, and which rules fired in which outcome (numbered as the outcomes)."""
+
+    outcomes: list[Outcome]
+    thrown: bool
+    fired: list[set[str]]
+
+
+def run_differing_model(tree: Tree) -> Explained:
+    """Runs the reference model with BehaviorTree.CPP's differences, up to an exception."""
+    world = BtCppWorld()
+    differing = ModelTree(tree, world, NODES)
+    explained = Explained([], False, [])
+    for number in range(len(tree.times)):
+        try:
+            outcome = differing.tick(number)
+        except ThrownError:
+            explained.fired.append(world.fired)
+            explained.thrown = True
+            return explained
+        if outcome.status in COMPLETED:  # then BehaviorTree.CPP resets the root
+            differing.root.code = IDLE
+            outcome = outcome._replace(codes=bytes([IDLE]) + outcome.codes[1:])
+        explained.outcomes.append(outcome)
+        explained.fired.append(world.fired)
+        world.fired = set()
+        if tree.halt_after == number + 1:
+            explained.outcomes.append(differing.halt())
+            explained.fired.append(world.fired)
+            world.fired = set()
+    return explained
+
+
+def shown_alike(tree: Tree, ours: Outcome, theirs: Outcome) -> bool:
+    """Whether the engine and BehaviorTree.CPP show the same statuses after a tick, but for how it shows them.
+
+    The differences that only are shown: it resets a completed root; it does not store SKIPPED; a reactive node resets
+    what it has ticked before the RUNNING child; a SequenceWithMemory that fails does not reset the children before; a two-child IfThenElse does not reset its condition after a FAILURE.
+    """
+    parents: list[Spec | None] = []
+    specs: list[Spec] = []
+
+    def number(spec: Spec, parent: Spec | None) -> None:
+        specs.append(spec)
+        parents.append(parent)
+        for child in spec.children:
+            number(child, spec)
+
+    number(tree.root, None)
+    return all(
+        _alike(spec, parent, our, their)
+        for spec, parent, our, their in zip(specs, parents, ours.codes, theirs.codes, strict=True)
+    )
+
+
+def _alike(spec: Spec, parent: Spec | None, ours: int, theirs: int) -> bool:
+    if (IDLE if ours >= WAS else ours) == theirs:
+        return True
+    if parent is None and ours in COMPLETED and theirs == IDLE:
+        return True
+    if ours == SKIPPED or ours == WAS + SKIPPED:
+        return theirs in ((IDLE, RUNNING) if spec.children else (IDLE, SKIPPED))
+    if parent is None:
+        return False
+    if parent.kind in ("ReactiveSequence", "ReactiveFallback"):
+        return ours in (SUCCESS, FAILURE) and theirs == IDLE
+    if parent.kind == "SequenceWithMemory":
+        return ours == WAS + theirs
+    if parent.kind == "IfThenElse" and len(parent.children) == 2 and spec is parent.children[0]:
+        return ours == WAS + FAILURE and theirs == FAILURE
+    return False
+
+
+def can_load(tree: Tree) -> bool:
+    """Whether BehaviorTree.CPP accepts the tree: a ReactiveSequence may have one child that is an AsyncSequence."""
+    return all(
+        spec.kind != "ReactiveSequence" or [child.kind for child in spec.children].count("AsyncSequence") < 2
+        for spec in tree.root.walk()
+    )

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT
+"""The engine against the model and against BehaviorTree.CPP, on random trees; see docs/differential.md."""
+
+from __future__ import annotations
+
+import platform
+import random
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from differential import differences, model
+from differential.compare import (
+    Report,
+    compare_with_btcpp,
+    compare_with_model,
+    engine_against_model,
+    run_btcpp,
+    smallest_failure,
+)
+from differential.differences import RULES, can_load, run_differing_model
+from differential.engine import run_engine
+from differential.generate import DEPTH_MAX, NODES_MAX, Wanted, generate
+from differential.model import Node, run_model
+from differential.paper import acted, experiment
+from differential.settings import BTCPP_TREES, MODEL_TREES, SEED, TIMEOUT_S
+from differential.tree import FAILURE, HALTED, RUNNING, SHAPES, SUCCESS, Tree, engine_kinds
+
+Figure = Callable[[str], None]
+
+# As in host_tools/pyproject.toml: there is no package elsewhere, so nothing to compare with. Where there is one, it has
+# to be installed.
+needs_btcpp = pytest.mark.skipif(
+    sys.platform != "linux" or platform.machine() != "x86_64" or sys.version_info >= (3, 14),
+    reason="behaviortreepy is made for x86-64 Linux and Python up to 3.13 only",
+)
+
+ENGINE = Wanted(tuple(kind for kind in SHAPES if kind in engine_kinds()))
+
+
+def _btcpp_wanted(kinds: frozenset[str]) -> Wanted:
+    """Without what BehaviorTree.CPP cannot be given; what makes the rest of a run differ is seldom."""
+    return Wanted(
+        tuple(kind for kind in differences.NODES if kind in kinds),
+        nonsense=False,
+        odd_times=False,
+        seldom=("SequenceWithMemory", "Repeat", "RetryUntilSuccessful", "KeepRunningUntilFailure"),
+        conditions_skip=False,
+        running_skips=False,
+    )
+
+
+# What the engine has, and all that can be compared: the same once the engine is whole.
+BTCPP_WITH_ENGINE = _btcpp_wanted(engine_kinds())
+BTCPP_ALL = _btcpp_wanted(frozenset(SHAPES))
+
+
+def _must_agree(report: Report, difference: Callable[[Tree], str | None]) -> None:
+    if report.failures:
+        tree, how = smallest_failure(report, difference)
+        pytest.fail(
+            f"{len(report.failures)} of {report.trees} trees differ (CANOPY_SEED={SEED}). The smallest:\n"
+            f"{tree.text()}\n{how}",
+            pytrace=False,
+        )
+
+
+@pytest.mark.timeout(TIMEOUT_S)
+def test_the_engine_does_what_the_model_says(runner: Path, figure: Figure) -> None:
+    begin = time.monotonic()
+    trees = generate(SEED, ENGINE, range(MODEL_TREES))
+    report = compare_with_model(runner, trees)
+    _must_agree(report, lambda tree: engine_against_model(runner, tree))
+    nodes = [sum(1 for _ in tree.root.walk()) for tree in trees]
+    figure(
+        f"engine and model: {report.trees} trees of {sum(nodes) / len(nodes):.1f} nodes ({max(nodes)} at most), "
+        f"{report.ticks} ticks and halts, {len(engine_kinds())} kinds of nodes, {time.monotonic() - begin:.1f} s"
+    )
+
+
+@needs_btcpp
+@pytest.mark.timeout(TIMEOUT_S)
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("BehaviorTree.CPP and engine", BTCPP_WITH_ENGINE), ("BehaviorTree.CPP and model", BTCPP_ALL)]
+)
+def test_behaviortree_cpp_differs_by_the_rules_only(runner: Path, figure: Figure, name: str, wanted: Wanted) -> None:
+    begin = time.monotonic()
+    trees = [tree for tree in generate(SEED, wanted, range(BTCPP_TREES // 2)) if can_load(tree)]
+    report = compare_with_btcpp(runner, trees)
+    _must_agree(report, lambda tree: next((how for _, how in compare_with_btcpp(runner, [tree]).failures), None))
+    figure(
+        f"{name}: {report.trees} trees, {report.ticks} ticks and halts all explained; {report.direct} of them "
+        f"({100 * report.direct / report.ticks:.1f} %) the same, the rest come after a rule fired; "
+        f"{report.thrown} trees ended by an exception; {time.monotonic() - begin:.1f} s"
+    )
+    figure("  first rule to fire: " + ", ".join(f"{rule} {count}" for rule, count in report.first_rules.most_common()))
+    assert report.direct > 0.8 * report.ticks, "too little was compared: the generator makes too many differences"
+
+
+def test_every_rule_fires() -> None:
+    wanted = Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False)
+    fired: set[str] = set()
+    for tree in generate(SEED, wanted, range(1500)):
+        fired.update(*run_differing_model(tree).fired)
+    assert fired == set(RULES)
+
+
+def test_what_the_paper_defines(runner: Path) -> None:
+    experiments = [experiment(random.Random(f"{SEED}/paper/{number}")) for number in range(500)]
+    for made, result in zip(experiments, run_engine(runner, [made.tree for made in experiments]), strict=True):
+        for x, outcome in zip(made.states, result.outcomes, strict=True):
+            assert outcome.status == made.behaviour.r(x), made.tree.text()
+            assert acted(made.tree.root, outcome.calls) == made.behaviour.f(x), made.tree.text()
+
+
+def test_the_trees_are_as_large_and_deep_as_promised() -> None:
+    trees = generate(SEED, Wanted(tuple(SHAPES)), range(1000))
+    sizes = [sum(1 for _ in tree.root.walk()) for tree in trees]
+    assert NODES_MAX * 0.9 < max(sizes) <= NODES_MAX
+    assert max(tree.root.depth() for tree in trees) == DEPTH_MAX
+    assert {kind for tree in trees for kind in tree.kinds()} == set(SHAPES)
+    for spec in (spec for tree in trees for spec in tree.root.walk()):
+        assert SHAPES[spec.kind].least <= len(spec.children) <= SHAPES[spec.kind].most
+
+
+# --- That the comparison can fail -------------------------------------------------------------------------------------
+
+
+class ForgetfulSequence(model.Sequence):
+    """Begins again at its first child, as the reactive one does."""
+
+    def tick_children(self) -> int:
+        self.begin()
+        return super().tick_children()
+
+
+class LazyReactiveSequence(model.ReactiveSequence):
+    """Does not halt what ran before."""
+
+    def tick_children(self) -> int:
+        for child in self.children:
+            status = child.tick()
+            if status == RUNNING:
+                return RUNNING
+            if status == FAILURE:
+                return status
+        return SUCCESS
+
+
+class ImpatientRetry(model.RetryUntilSuccessful):
+    """Counts one attempt too many."""
+
+    def begin(self) -> None:
+        self.cycles = 1
+
+
+class LateTimeout(model.Timeout):
+    """Forgets to look at the clock."""
+
+    def tick_children(self) -> int:
+        return self.tick_child()
+
+
+class TwiceHalted(model.StatefulAction):
+    """Is told twice that it is halted."""
+
+    def on_halt(self) -> None:
+        self.world.calls += [(self.number, HALTED)] * 2
+
+
+class LenientCondition(model.Condition):
+    """May be RUNNING."""
+
+    valid = (RUNNING, *model.Condition.valid)
+
+
+@pytest.mark.parametrize(
+    "wrong", [ForgetfulSequence, LazyReactiveSequence, ImpatientRetry, LateTimeout, TwiceHalted, LenientCondition]
+)
+def test_a_wrong_model_is_found_out(runner: Path, wrong: type[Node]) -> None:
+    kind = wrong.__mro__[1].__name__
+    nodes = model.NODES | {kind: wrong}
+    report = compare_with_model(runner, generate(SEED, ENGINE, range(300)), lambda tree: run_model(tree, nodes))
+    assert report.failures
+    tree, how = smallest_failure(
+        report, lambda tree: engine_against_model(runner, tree, lambda tree: run_model(tree, nodes))
+    )
+    assert kind in tree.kinds()
+    assert sum(1 for _ in tree.root.walk()) <= 5, f"not shrunk well:\n{tree.text()}\n{how}"
+    assert "engine: " in how or "faults: " in how
+
+
+@needs_btcpp
+@pytest.mark.parametrize(
+    "kind", ["SequenceWithMemory", "KeepRunningUntilFailure", "Repeat", "RetryUntilSuccessful", "IfThenElse", "RunOnce"]
+)
+def test_without_its_rule_a_difference_is_found(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    trees = generate(SEED, Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False), range(400))
+    trees = [tree for tree in trees if can_load(tree) and kind in tree.kinds()]
+    plain = type(kind, (differences.BtCppNode, model.NODES[kind]), {})
+    monkeypatch.setitem(differences.NODES, kind, plain)
+    theirs = run_btcpp(trees)
+    explained = [run_differing_model(tree) for tree in trees]
+    assert any(ours.outcomes != outcomes for ours, (outcomes, _) in zip(explained, theirs, strict=True))

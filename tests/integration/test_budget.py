@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""The printed budget against a real compiler for a 32-bit target."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from canopy.cli import main
+
+ROOT = Path(__file__).parents[2]
+APPLICATIONS = {
+    "nao_home": ("examples/nao/trees/get_home.xml", "examples/nao/nao.dbc", 50),
+    "nao_power": ("examples/nao/trees/power_supply.xml", "examples/nao/nao.dbc", 50),
+    "features": ("tests/unit/features/tree.xml", "tests/unit/features/features.dbc", 10),
+}
+# 6 bytes of state in each of two uses of CoolDown: the compiler does not know the user's types. Padding may add 7.
+USER_STATE = {"features": 2 * 6}
+
+
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: str) -> None:
+    tree, dbc, period = APPLICATIONS[name]
+    arguments = [str(ROOT / tree), "--name", name, "--dbc", str(ROOT / dbc), "--node", "Controller"]
+    include = ["--include", str(ROOT / "tests/unit/features/state.h")] if name == "features" else []
+    result = CliRunner().invoke(
+        main, ["compile", *arguments, "--period-ms", str(period), "-o", str(tmp_path), *include]
+    )
+    assert result.exit_code == 0, result.output
+    budget = re.search(r"RAM +(\d+) bytes", result.output)
+    assert budget is not None
+    objects = tmp_path / "app.o"
+    target = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-std=c11", "-Os", "-ffreestanding"]
+    includes = [f"-I{ROOT / 'runtime/include'}", f"-I{tmp_path}"]
+    subprocess.run([*target, *includes, "-c", str(tmp_path / f"{name}_app.c"), "-o", str(objects)], check=True)
+    symbols = subprocess.run(
+        ["arm-none-eabi-nm", "--print-size", "--radix=d", str(objects)], check=True, stdout=subprocess.PIPE, text=True
+    ).stdout
+    memory = re.search(r"^\d+ (\d+) b memory$", symbols, re.MULTILINE)
+    assert memory is not None, symbols
+    assert int(memory[1]) - USER_STATE.get(name, 0) == pytest.approx(int(budget[1]), abs=7)

@@ -1,0 +1,272 @@
+/* SPDX-License-Identifier: MIT */
+/** @file The ends of the loop's and the trace's ranges: what is missing, optional, saturated, or very late. */
+#include "canopy/loop.h"
+#include "fake_can.h"
+#include "unity.h"
+
+enum { PERIOD_US = 1000 };
+
+static const canopy_node_t nodes[] = {{.type = CANOPY_NODE_ALWAYS_SUCCESS, .end = 1}};
+static const canopy_tree_t tree = {.nodes = nodes, .node_count = 1};
+static canopy_tree_instance_t instance;
+static canopy_bus_state_t bus_state;
+static canopy_trace_state_t trace_state;
+static canopy_rx_state_t rx_state;
+static uint8_t tx_counter;
+static uint8_t status;
+static uint8_t sent;
+static int image;
+
+static bool decode(void *input, const uint8_t *data)
+{
+    (void)input;
+    (void)data;
+    return true;
+}
+
+static void set_fresh(void *input, bool fresh)
+{
+    (void)input;
+    (void)fresh;
+}
+
+static void encode(const void *output, uint8_t *data)
+{
+    (void)output;
+    data[0] = 0;
+}
+
+static void reset_output(void *output)
+{
+    (void)output;
+}
+
+static void set_now(void *input, canopy_time_t now)
+{
+    (void)input;
+    (void)now;
+}
+
+static const canopy_rx_message_t rx = {
+    .id = 1, .length = 1, .data_id = CANOPY_E2E_NONE, .decode = decode, .set_fresh = set_fresh};
+static const canopy_tx_message_t tx = {.id = 2, .length = 1, .data_id = CANOPY_E2E_NONE, .every = 1, .encode = encode};
+static const canopy_bus_t bus = {
+    .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_now = set_now};
+static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_now = set_now};
+static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_now = set_now};
+static const canopy_trace_config_t no_trace = {.tick = {.id = CANOPY_TRACE_OFF},
+                                               .change = {.id = CANOPY_TRACE_OFF},
+                                               .snapshot = {.id = CANOPY_TRACE_OFF},
+                                               .health = {.id = CANOPY_TRACE_OFF},
+                                               .health_every = 1,
+                                               .changes_max = 1};
+
+/* A clock whose every reading and deadline the test gives. */
+static canopy_time_t readings[8];
+static unsigned reading;
+static unsigned cycles_left;
+
+static canopy_time_t now(void *context)
+{
+    (void)context;
+    return readings[reading++];
+}
+
+static bool wait_until(void *context, canopy_time_t deadline)
+{
+    (void)context;
+    (void)deadline;
+    return cycles_left-- > 0u;
+}
+
+static const canopy_clock_t fake_clock = {.now = now, .wait_until = wait_until};
+
+static canopy_app_t app;
+static canopy_loop_config_t config;
+static canopy_loop_t loop;
+
+void setUp(void)
+{
+    fake_can_reset();
+    reading = 0;
+    for (unsigned place = 0; place < sizeof readings / sizeof readings[0]; place++) {
+        readings[place] = 0;
+    }
+    app = (canopy_app_t){.name = "limits",
+                         .period = PERIOD_US,
+                         .tree = &tree,
+                         .bus = &bus,
+                         .trace = &no_trace,
+                         .tree_instance = &instance,
+                         .status = &status,
+                         .bus_state = &bus_state,
+                         .input = &image,
+                         .output = &image,
+                         .rx = &rx_state,
+                         .tx_counters = &tx_counter,
+                         .trace_state = &trace_state,
+                         .sent = &sent};
+    config = (canopy_loop_config_t){.app = &app, .can = &fake_can, .clock = &fake_clock};
+}
+
+void tearDown(void)
+{
+}
+
+/** A complete configuration, this change: refused. */
+#define INCOMPLETE(change)                                                                           \
+    do {                                                                                             \
+        setUp();                                                                                     \
+        TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));                              \
+        change;                                                                                      \
+        TEST_ASSERT_EQUAL_MESSAGE(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &config), #change); \
+    } while (false)
+
+static void an_incomplete_configuration_is_refused(void)
+{
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(NULL, &config));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, NULL));
+    INCOMPLETE(config.app = NULL);
+    INCOMPLETE(config.can = NULL);
+    INCOMPLETE(config.clock = NULL);
+    INCOMPLETE(app.period = 0);
+    INCOMPLETE(app.tree = NULL);
+    INCOMPLETE(app.bus = NULL);
+    INCOMPLETE(app.trace = NULL);
+    INCOMPLETE(app.tree_instance = NULL);
+    INCOMPLETE(app.status = NULL);
+    INCOMPLETE(app.bus_state = NULL);
+    INCOMPLETE(app.input = NULL);
+    INCOMPLETE(app.output = NULL);
+    INCOMPLETE(app.rx = NULL);
+    INCOMPLETE(app.tx_counters = NULL);
+    INCOMPLETE(app.trace_state = NULL);
+    INCOMPLETE(app.sent = NULL);
+}
+
+static void a_bus_without_messages_needs_no_state_for_them(void)
+{
+    app.tx_counters = NULL;
+    app.bus = &mute_bus;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    app.bus = &silent_bus;
+    app.rx = NULL;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+}
+
+static void hooks_may_be_missing(void)
+{
+    fake.rx_error = CANOPY_ERROR_IO; /* a fault that nobody wants to hear of */
+    cycles_left = 2;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL_UINT32(2, loop.ticks);
+    TEST_ASSERT_EQUAL_UINT32(2, loop.rx_errors);
+}
+
+static unsigned kicks;
+
+static void kick(void *context)
+{
+    (void)context;
+    kicks++;
+}
+
+static bool after_cycle(void *context, canopy_status_t root)
+{
+    (void)context;
+    TEST_ASSERT_EQUAL(CANOPY_SUCCESS, root);
+    return kicks < 2u;
+}
+
+static void the_hook_after_a_cycle_can_end_the_loop(void)
+{
+    config.after_cycle = after_cycle;
+    config.kick_watchdog = kick;
+    cycles_left = 5;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL_UINT32(2, loop.ticks);
+    TEST_ASSERT_EQUAL_UINT(2, kicks);
+}
+
+static canopy_fault_t last_fault;
+static uint32_t last_detail;
+
+static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
+{
+    (void)context;
+    last_fault = fault;
+    last_detail = detail;
+}
+
+static void a_cycle_longer_than_32_bits_is_told_as_the_largest(void)
+{
+    app.period = UINT64_C(1) << 33;
+    config.on_fault = on_fault;
+    cycles_left = 1;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    readings[2] = (UINT64_C(1) << 33) + 1u;
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL(CANOPY_FAULT_OVERRUN, last_fault);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, last_detail);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.slips);
+}
+
+static void a_cycle_that_ends_when_the_one_after_the_next_is_due_leaves_out_one(void)
+{
+    cycles_left = 1;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    readings[2] = 2u * PERIOD_US;
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.overruns);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(2u * PERIOD_US, loop.deadline);
+}
+
+static void a_very_late_start_is_in_the_last_bucket(void)
+{
+    cycles_left = 1;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    readings[1] = UINT64_C(1000000);
+    readings[2] = UINT64_C(1000000);
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.lateness[CANOPY_LATENESS_BUCKETS - 1u]);
+    TEST_ASSERT_EQUAL_UINT64(1000000, loop.most_late);
+}
+
+static void counters_stay_at_their_largest_value(void)
+{
+    static const canopy_can_frame_t unknown = {.id = 99, .length = 1};
+    static const canopy_trace_config_t health = {.tick = {.id = CANOPY_TRACE_OFF},
+                                                 .change = {.id = CANOPY_TRACE_OFF},
+                                                 .snapshot = {.id = CANOPY_TRACE_OFF},
+                                                 .health = {.id = 7},
+                                                 .health_every = 1};
+
+    app.trace = &health;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    bus_state.counters = (canopy_bus_counters_t){
+        .unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1, .tx_dropped = UINT32_MAX};
+    trace_state.tx_dropped = 1;
+    canopy_bus_receive(&bus_state, &unknown, 0);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, bus_state.counters.unknown_id);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, canopy_bus_rejected(&bus_state.counters));
+    (void)canopy_loop_cycle(&loop, 0);
+    TEST_ASSERT_EQUAL_UINT(2, fake.tx_count);
+    TEST_ASSERT_EACH_EQUAL_HEX8(0xFF, fake.tx[1].data, 6); /* rejected, unknown, dropped */
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(an_incomplete_configuration_is_refused);
+    RUN_TEST(a_bus_without_messages_needs_no_state_for_them);
+    RUN_TEST(hooks_may_be_missing);
+    RUN_TEST(the_hook_after_a_cycle_can_end_the_loop);
+    RUN_TEST(a_cycle_longer_than_32_bits_is_told_as_the_largest);
+    RUN_TEST(a_cycle_that_ends_when_the_one_after_the_next_is_due_leaves_out_one);
+    RUN_TEST(a_very_late_start_is_in_the_last_bucket);
+    RUN_TEST(counters_stay_at_their_largest_value);
+    return UNITY_END();
+}
