@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
-#                        [INCLUDE state_types.h] [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
+#                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [TYPE_MAP "C++ type=C type"…]
+#                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
 # generated tables, the codec, and your leaves. Link it, and a CAN and a clock driver, into your program:
@@ -20,9 +21,12 @@ cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH CANOPY_SOURCE_DIR)
 file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
      "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
      "${CANOPY_SOURCE_DIR}/runtime/include/canopy/nodes.def")
+# A property: a variable would be known only where this file was included first.
+set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
 
 function(canopy_add_application NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 APP "" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH" "LEAVES")
+  cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH"
+                        "LEAVES;TYPE_MAP")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
       message(FATAL_ERROR "canopy_add_application(${NAME}): ${required} is missing")
@@ -31,6 +35,7 @@ function(canopy_add_application NAME)
   if(APP_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "canopy_add_application(${NAME}): unknown arguments: ${APP_UNPARSED_ARGUMENTS}")
   endif()
+  get_property(compiler GLOBAL PROPERTY CANOPY_COMPILER_SOURCES)
   cmake_path(ABSOLUTE_PATH APP_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(ABSOLUTE_PATH APP_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(GET APP_DBC STEM bus)
@@ -47,15 +52,22 @@ function(canopy_add_application NAME)
       list(APPEND options "--${flag}" "${APP_${option}}")
     endif()
   endforeach()
+  if(APP_ALLOW_FLOATING_POINT)
+    list(APPEND options --allow-floating-point)
+  endif()
+  foreach(pair IN LISTS APP_TYPE_MAP)
+    list(APPEND options --type-map "${pair}")
+  endforeach()
   add_custom_command(
     OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"
     COMMAND "${CANOPY_PYTHON}" -I -m canopy compile # -I: the folder `canopy` of a build is no package
             "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
-            --period-ms "${APP_PERIOD_MS}" --output "${folder}" ${options}
-    DEPENDS "${APP_TREE}" "${APP_DBC}" ${CANOPY_COMPILER_SOURCES}
+            --period-ms "${APP_PERIOD_MS}" --output "${folder}" --depfile "${folder}.d" ${options}
+    DEPENDS "${APP_TREE}" "${APP_DBC}" ${compiler}
+    DEPFILE "${folder}.d" # the files that the tree includes
     COMMENT "canopy compile ${NAME}"
     VERBATIM)
   add_library(${NAME}_application STATIC ${sources} ${headers} ${APP_LEAVES})
-  target_include_directories(${NAME}_application PUBLIC "${folder}" PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}")
+  target_include_directories(${NAME}_application PUBLIC "${folder}" "${CMAKE_CURRENT_SOURCE_DIR}")
   target_link_libraries(${NAME}_application PUBLIC canopy_runtime PRIVATE canopy_warnings)
 endfunction()

@@ -58,6 +58,9 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
     }
     start_bus(app);
     start_trace(app);
+    if (app->start != NULL) {
+        app->start(app->memory);
+    }
     *self = (canopy_loop_t){.config = config, .deadline = config->clock->now(config->clock->context)};
     return CANOPY_OK;
 }

@@ -45,10 +45,32 @@ static bool attributes_fit(const canopy_tree_t *tree, const canopy_node_t *node)
     return true;
 }
 
+/** Parameters that a script gives: the script is there. */
+static bool asked_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+{
+    for (unsigned which = 0; which < 8u; which++) {
+        if (((node->asks >> which) & 1u) != 0u &&
+            (which >= shapes[node->type].parameters || !script_fits(tree, node, which, 0))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/** Is the type one whose parameters are scripts and statuses themselves? */
+static bool is_scripted(uint8_t type)
+{
+    return type >= (uint8_t)CANOPY_NODE_PRECONDITION && type <= (uint8_t)CANOPY_NODE_SWITCH;
+}
+
 /** Parameters that name scripts and statuses; the parameters themselves are known to be there. */
 static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
 {
     const uint8_t type = node->type;
+
+    if (node->asks != 0u && (is_scripted(type) || !asked_fit(tree, node))) {
+        return false;
+    }
 
     if (type == (uint8_t)CANOPY_NODE_ATTRIBUTES) {
         return attributes_fit(tree, node);

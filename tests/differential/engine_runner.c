@@ -127,7 +127,7 @@ static void read_nodes(uint16_t count)
         canopy_node_t *node = &run.nodes[i];
 
         node->type = (uint8_t)read_number(1);
-        node->reserved = (uint8_t)read_number(1);
+        node->asks = (uint8_t)read_number(1);
         node->parent = (uint16_t)read_number(2);
         node->end = (uint16_t)read_number(2);
         node->state = (uint16_t)read_number(2);

@@ -64,12 +64,12 @@ def expect_error(tmp_path: Path, result: Result, place: str, *texts: str) -> Non
         ("<ReactiveParallel success_count='3'><Ready/><Ready/></ReactiveParallel>", "main.xml:3:5", ["never be met"]),
         ("<ReactiveParallel success_count='0'><Ready/></ReactiveParallel>", "main.xml:3:5", ["success_count=0"]),
         ("<Go/>", "main.xml:3:5", ["'Go' needs a value for its port 'speed'"]),
-        ("<Go speed='300'/>", "main.xml:3:5", ["port 'speed': 300 is outside uint8_t [0, 255]"]),
-        ("<Go speed='fast'/>", "main.xml:3:5", ["'fast' is not a whole number"]),
-        ("<Go speed='{x}'/>", "main.xml:3:5", ["blackboard entries ({x}) are not supported"]),
+        ("<Go speed='300'/>", "main.xml:3:16", ["port 'speed' of 'Go': 300 is outside uint8_t [0, 255]"]),
+        ("<Go speed='fast'/>", "main.xml:3:16", ["'fast' is not a whole number"]),
+        ("<Go speed='{x}'/>", "main.xml:3:16", ["port 'speed' of 'Go': nothing writes entry 'x'"]),
         ("<Go sped='3'/>", "main.xml:3:5", ["has no attribute 'sped'", "did you mean 'speed'?"]),
-        ("<Ready _skipIf='true'/>", "main.xml:3:5", ["the attribute _skipIf is not supported"]),
-        ("<SubTree ID='Main'/>", "main.xml:3:5", ["<SubTree> is not supported yet"]),
+        ("<Ready _skpIf='true'/>", "main.xml:3:5", ["has no attribute '_skpIf'", "did you mean '_skipIf'?"]),
+        ("<SubTree ID='Main'/>", "main.xml:3:5", ["trees contain each other in a cycle: Main -> Main"]),
         ("<Action ID='Ready'/>", "main.xml:3:5", ["'Ready' is declared as Condition"]),
     ],
 )
@@ -96,7 +96,7 @@ def test_a_wrong_node_is_named_with_its_place(tmp_path: Path, nodes: str, place:
          ["unsupported type 'std::vector'"]),
         ("<Condition ID='Ready'/><Condition ID='ready'/>", ["'ready' is declared again"]),
         ("<Condition/>", ["needs an ID"]),
-        ("<Control ID='Ready'/>", ["<Control> in <TreeNodesModel> is not supported"]),
+        ("<Node ID='Ready'/>", ["<Node> in <TreeNodesModel> is not supported"]),
     ],
 )  # fmt: skip
 def test_a_wrong_declaration_of_a_leaf_is_named(tmp_path: Path, model: str, texts: list[str]) -> None:
@@ -119,7 +119,8 @@ def test_a_wrong_declaration_of_a_leaf_is_named(tmp_path: Path, model: str, text
         (b"<!DOCTYPE a [<!ENTITY b 'c'>]>\n<root BTCPP_format='4'>&b;</root>", "main.xml:1:1", "is not accepted"),
         (b"\xff\xfe\x00", "main.xml:1:", "not well-formed XML"),
         (b"<root BTCPP_format='4'><BehaviorTree/></root>", "main.xml:1:24", "needs an ID of its own"),
-        (b"<root BTCPP_format='4'><include path='x'/></root>", "main.xml:1:24", "<include> is not supported here"),
+        (b"<root BTCPP_format='4'><include path='x'/></root>", "main.xml:1:39", "x' is not there"),
+        (b"<root BTCPP_format='4'><includes path='x'/></root>", "main.xml:1:24", "did you mean 'include'?"),
     ],
 )
 def test_a_malformed_file_is_an_error_with_a_place(tmp_path: Path, text: bytes, place: str, message: str) -> None:

@@ -279,6 +279,24 @@ static void wrong_answers_of_a_users_node_are_faults(void)
     TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 2));
 }
 
+static void a_parameter_may_be_a_script(void)
+{
+    static const canopy_node_t nodes[] = {{.type = CANOPY_NODE_REPEAT, .end = 2, .asks = 1}, ACTION(0, 1, 0)};
+    static canopy_node_t wrong[] = {{.type = CANOPY_NODE_REPEAT, .end = 2, .asks = 2}, ACTION(0, 1, 0)};
+    static const int32_t script[] = {3};
+    static const int32_t no_script[] = {8};
+
+    answers[3] = 2;
+    start(nodes, 2, script, 1);
+    EXPECT("S", CANOPY_RUNNING, "DaD");
+    EXPECT("S", CANOPY_SUCCESS, "DaD");
+    bench.tree.parameters = no_script;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
+    bench.tree.parameters = script;
+    bench.tree.nodes = wrong;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
+}
+
 static void refuses(const int32_t *parameters, canopy_node_type_t type)
 {
     static canopy_node_t nodes[] = {INNER(ATTRIBUTES, 0, 2, 0, 0), ACTION(0, 1, 0)};
@@ -325,6 +343,7 @@ int main(void)
     RUN_TEST(switch_ticks_the_matching_case_and_halts_the_old_one);
     RUN_TEST(a_control_node_of_the_users_own);
     RUN_TEST(wrong_answers_of_a_users_node_are_faults);
+    RUN_TEST(a_parameter_may_be_a_script);
     RUN_TEST(the_validator_refuses_scripts_and_statuses_that_are_none);
     return UNITY_END();
 }

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 from canopy.compiler.bus_reader import Bus, Message
+from canopy.compiler.leaf_c import entry_type
+from canopy.compiler.leaf_model import Port
 from canopy.compiler.table import Table
 
 # (size, alignment) on a 32-bit target with 8-byte alignment of 64-bit integers: Arm EABI and RISC-V ILP32.
@@ -79,6 +81,7 @@ def ram_bytes(table: Table, bus: Bus) -> int:
             trace_state,
             image_in,
             image_out,
+            _entries(table),
             array(rx_state, max(1, len(bus.receive))),
             array(u16, max(1, table.words)),
             array(u8, nodes),
@@ -88,17 +91,35 @@ def ram_bytes(table: Table, bus: Bus) -> int:
     )[0]
 
 
+def _port(port: Port) -> tuple[int, int]:
+    """A port's member: a pointer for outputs, texts and types of the user's."""
+    return scalar("pointer" if port.writes or port.type.kind in ("text", "user") else port.type.c)
+
+
+def _entries(table: Table) -> tuple[int, int]:
+    """The blackboard. Entries of the user's own types are not counted."""
+    members = []
+    for entry in table.bindings.entries:
+        if entry.type.capacity:
+            members.append(struct_size([scalar("uint16_t"), array(scalar(entry.type.item), entry.type.capacity)]))
+        elif entry.type.kind != "user":
+            members.append(scalar(entry_type(entry)))
+        if entry.counted:
+            members.append(scalar("uint32_t"))
+    return struct_size([*members, scalar("uint32_t")]) if members or table.scripts else (0, 1)
+
+
 def flash_bytes(table: Table, bus: Bus) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(
-        struct_size(scalar(port.c_type) for port in use.leaf.ports)[0] * len(use.nodes)
-        for use in table.leaves
-        if use.leaf.ports
+        struct_size(_port(port) for port in use.leaf.ports)[0] * len(use.nodes) for use in table.users if use.leaf.ports
     )
     rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
     tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)
-    return 12 * len(table.rows) + 12 * len(table.leaves) + 4 * len(table.parameters) + ports + rx + tx
+    tables = 12 * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
+    numbers = 4 * (len(table.parameters) + len(table.scripts) + len(table.bindings.texts))
+    return tables + numbers + ports + rx + tx
 
 
 def frame_bits(length: int, *, extended: bool, fd: bool) -> int:
@@ -125,7 +146,7 @@ def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -
 
 
 def make_budget(table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> Budget:
-    """The whole budget. A tick visits each node at most once, so it calls each leaf at most once (docs/semantics.md)."""
+    """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     return Budget(
         ram_bytes=ram_bytes(table, bus),
         flash_bytes=flash_bytes(table, bus),

@@ -11,7 +11,10 @@ import click
 
 from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render, write_files
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.names import is_c_identifier
+from canopy.compiler.port_types import Options
+from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
 
@@ -27,6 +30,16 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
 
 
+def _read_type_map(pairs: tuple[str, ...]) -> dict[str, str]:
+    result = {}
+    for pair in pairs:
+        cxx, found, c_type = pair.rpartition("=")
+        if not found or not is_c_identifier(c_type.strip()):
+            raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
+        result[cxx.strip()] = c_type.strip()
+    return result
+
+
 @click.command()
 @click.argument("tree", type=click.Path(path_type=Path))
 @click.option("--dbc", required=True, type=click.Path(path_type=Path), help="The bus the controller is on.")
@@ -35,6 +48,10 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder for the generated files.")
 @click.option("--name", help="Name of the application; the tree file's stem if not given.")
 @click.option("--include", help="Header of yours with the state types of leaves, included by the generated files.")
+@click.option("--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double.")
+@click.option("--type-map", "type_map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type.")
+@click.option("--stubs", "stubs_file", type=click.Path(path_type=Path), help="Write skeletons of what you write.")
+@click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
 @click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=int, help="Fail when the constant tables are larger than so many bytes.")
@@ -47,6 +64,10 @@ def command(
     output: Path,
     name: str | None,
     include: str | None,
+    floats: bool,
+    type_map: tuple[str, ...],
+    stubs_file: Path | None,
+    depfile: Path | None,
     bitrate: int,
     max_ram: int | None,
     max_flash: int | None,
@@ -54,7 +75,7 @@ def command(
 ) -> None:
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
 
-    Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the host tools.
+    Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the tools.
     Nothing is written when anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
 
     \b
@@ -62,7 +83,8 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include)
+        options = Options(floats, _read_type_map(type_map), include)
+        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options)
         files = render(application)
     except CompileError as error:
         click.echo(str(error), err=True)
@@ -73,7 +95,15 @@ def command(
             click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
     try:
+        if stubs_file is not None:
+            write_stubs(stubs_file, stubs(application.name, application.table, application.bus))
         write_files(output, files)
+        if depfile is not None:
+            read = [str(file.resolve()) for file in (*application.table.tree.files, dbc)]
+            depfile.write_text(f"{output / application.name}_app.c: {' '.join(read)}\n".replace("\\", "/"))
+    except CompileError as error:
+        click.echo(str(error), err=True)
+        sys.exit(INPUT_ERROR)
     except OSError as error:
         click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
         sys.exit(INPUT_ERROR)

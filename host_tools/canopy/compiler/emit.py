@@ -14,11 +14,15 @@ import jinja2
 
 from canopy import __version__
 from canopy.compiler import codec
+from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.leaf_c import arguments, entry_type, parameters, port_members, prototypes, setters, stale_test
 from canopy.compiler.names import is_c_identifier, snake
+from canopy.compiler.port_types import Options, PortType, c_string
+from canopy.compiler.script.compile import Texts
+from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
 from canopy.compiler.tree_reader import read_tree
 
@@ -52,7 +56,7 @@ def _check_leaves(table: Table, bus: Bus) -> None:
         "reads": [message.name for message in bus.receive],
         "writes": [message.name for message in bus.send],
     }
-    for use in table.leaves:
+    for use in table.users:
         for verb, known in messages.items():
             for name in getattr(use.leaf, verb):
                 message, _, signal = name.partition(".")
@@ -72,7 +76,14 @@ def _check_leaves(table: Table, bus: Bus) -> None:
 
 
 def load_application(
-    name: str, tree: Path, dbc: Path, node: str, period_ms: int, bitrate: int, include: str | None = None
+    name: str,
+    tree: Path,
+    dbc: Path,
+    node: str,
+    period_ms: int,
+    bitrate: int,
+    include: str | None = None,
+    options: Options | None = None,
 ) -> Application:
     """Reads and checks everything.
 
@@ -81,8 +92,10 @@ def load_application(
     """
     if not is_c_identifier(name) or name != snake(name):
         raise CompileError(Place("--name"), f"'{name}' is not a lower-case C identifier", f"for example {snake(name)}")
-    table = make_table(read_tree(tree))
+    options = options or Options(include=include)
+    parsed = read_tree(tree, options)
     bus = read_bus(dbc, node, period_ms)
+    table = make_table(parsed, bind(parsed, bus, options, name))
     _check_leaves(table, bus)
     changes_max = min(CHANGES_MAX, -(-len(table.rows) // 2))
     budget = make_budget(table, bus, period_ms, changes_max, bitrate)
@@ -93,6 +106,11 @@ def _category(row_category: str, kind: str) -> str:
     if row_category == "LEAF":
         return "condition" if kind == "Condition" else "action"
     return row_category.lower()
+
+
+def _file(table: Table, place: Place) -> dict[str, str]:
+    """The file of a node that is not in the main file."""
+    return {} if place.file == str(table.tree.path) else {"file": Path(place.file).name}
 
 
 def model(application: Application) -> dict[str, object]:
@@ -112,10 +130,12 @@ def model(application: Application) -> dict[str, object]:
                     "index": index,
                     "parent": row.parent if index else None,
                     "end": row.end,
-                    "type": row.node.leaf.id if row.node.leaf else row.node.type.name,
+                    "type": row.node.xml_name,
                     "category": _category(row.node.type.category, row.node.type.name),
                     "name": row.node.name,
                     "line": row.node.place.line,
+                    "path": row.node.path,
+                    **_file(table, row.node.place),
                 }
                 for index, row in enumerate(table.rows)
             ],
@@ -131,44 +151,26 @@ def model(application: Application) -> dict[str, object]:
     }
 
 
-def _stale_test(bus: Bus, leaf: Leaf) -> str:
-    """C: is something that the leaf reads not known? A multiplexed signal that it names must have come, too."""
-    flags = {(m.name, s.name): s.has_name for m in bus.receive for s in m.multiplexed}
-    names = {m.name: m.c_name for m in bus.receive}
-    reads = sorted(
-        {
-            (names[message], flags.get((message, signal), "fresh"))
-            for message, _, signal in (name.partition(".") for name in leaf.reads)
-        }
-    )
-    return " || ".join(f"!app->input.{message}.{flag}" for message, flag in reads)
-
-
-def _parameters(leaf: Leaf, bus: Bus) -> str:
-    parts = [f"const {bus.name}_input_t *in"]
-    if leaf.writes:
-        parts.append(f"{bus.name}_output_t *out")
-    if leaf.ports:
-        parts.append(f"const {leaf.c_name}_ports_t *ports")
-    if leaf.state:
-        parts.append(f"{leaf.state} *self")
-    return ", ".join(parts)
-
-
-def _arguments(leaf: Leaf) -> str:
-    parts = ["&app->input"]
-    if leaf.writes:
-        parts.append("&app->output")
-    if leaf.ports:
-        parts.append(f"&{leaf.c_name}_ports[parameter]")
-    if leaf.state:
-        parts.append(f"&app->{leaf.c_name}[parameter]")
-    return ", ".join(parts)
-
-
 def _comment(text: str) -> str:
     """Text that may stand inside a C comment."""
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+
+
+def _queues(table: Table) -> list[PortType]:
+    """The types of queues, each once."""
+    kinds = [port.type for use in table.users for port in use.leaf.ports]
+    kinds += [entry.type for entry in table.bindings.entries]
+    return sorted({kind for kind in kinds if kind.capacity}, key=lambda kind: kind.c)
+
+
+def _short(place: Place) -> str:
+    """`get_home.xml:12`, for comments."""
+    return f"{Path(place.file).name}:{place.line}"
+
+
+def _exact(place: Place) -> str:
+    """`get_home.xml:12:5`, for comments."""
+    return f"{_short(place)}:{place.column}"
 
 
 def environment(bus: Bus) -> jinja2.Environment:
@@ -180,12 +182,16 @@ def environment(bus: Bus) -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    result.filters |= {"snake": snake, "comment": _comment}
+    result.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
     result.globals |= {
         "codec": codec,
-        "stale_test": functools.partial(_stale_test, bus),
-        "parameters_of": _parameters,
-        "arguments_of": _arguments,
+        "stale_test": functools.partial(stale_test, bus),
+        "parameters_of": parameters,
+        "arguments_of": arguments,
+        "prototypes_of": prototypes,
+        "port_members": port_members,
+        "setters": setters,
+        "entry_type": entry_type,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }
@@ -203,7 +209,18 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
 
 def render(application: Application) -> dict[str, str]:
     """File name -> content. The same input gives the same bytes."""
-    context = {"app": application, "table": application.table, "bus": application.bus}
+    bindings = application.table.bindings
+    texts = Texts()
+    texts.all = list(bindings.texts) or [""]
+    context = {
+        "app": application,
+        "table": application.table,
+        "bus": application.bus,
+        "entries": bindings.entries,
+        "texts": bindings.texts,
+        "queues": _queues(application.table),
+        "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
+    }
     name = application.name
     templates = {
         f"{name}_leaves.h": "leaves.h.j2",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Declarations of the user's leaves: the <TreeNodesModel> that Groot2 writes, with Canopy's <Metadata> fields.
+"""Declarations of the user's nodes: the <TreeNodesModel> that Groot2 writes, with Canopy's <Metadata> fields.
 
     <Action ID="WalkHome">
       <input_port name="step" type="int32_t" default="100">mm</input_port>
@@ -10,79 +10,63 @@
 
 Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction unless it says so), `reads` and `writes`
 (messages of the DBC, separated by spaces), `stale` (what the leaf returns while a message it reads is not fresh:
-FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the leaf's own state).
+FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state).
+
+<Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import is_c_identifier, snake
+from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
 
 METADATA = ("kind", "reads", "writes", "stale", "state")
 ACTION_KINDS = ("SyncAction", "StatefulAction")
+INNER_KINDS = ("Control", "Decorator")
 STALE = ("FAILURE", "SUCCESS")
-
-# Type names of ports: C++ and C spellings on the left.
-PORT_TYPES = {
-    "bool": "bool",
-    "int": "int32_t",
-    "unsigned": "uint32_t",
-    "unsigned int": "uint32_t",
-    **{f"{sign}int{bits}_t": f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)},
+PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
+    "input_port": "in",
+    "output_port": "out",
+    "inout_port": "inout",
 }
+MODEL_TAGS = ("Action", "Condition", "Control", "Decorator", "SubTree")
 
 
 @dataclass(frozen=True)
 class Port:
-    """An input port of a leaf. `c_type` is a C integer type or bool; `default` is None when a value must be given."""
+    """A port of a node. `default` is None when a value must be given (outputs may stay unconnected)."""
 
     name: str
-    c_type: str
+    type: PortType
     default: str | None
     description: str
-    place: Place
+    place: Place = field(compare=False)
+    direction: Literal["in", "out", "inout"] = "in"
+    capacity: int = 0
 
     @property
     def c_name(self) -> str:
-        """The member's name in the leaf's ports struct."""
+        """The member's name in the ports struct."""
         return snake(self.name)
 
-    def literal(self, text: str, place: Place) -> str:
-        """The C literal of a value of this port.
-
-        Raises:
-            CompileError: the text is not a value of the type.
-        """
-        if text.startswith("{"):
-            raise CompileError(
-                place, f"port '{self.name}': blackboard entries ({text}) are not supported", "give a literal value"
-            )
-        if self.c_type == "bool":
-            if text.lower() not in ("true", "false", "0", "1"):
-                raise CompileError(place, f"port '{self.name}': '{text}' is not a bool", "write true or false")
-            return "true" if text.lower() in ("true", "1") else "false"
-        try:
-            value = int(text, 0)
-        except ValueError:
-            raise CompileError(place, f"port '{self.name}': '{text}' is not a whole number ({self.c_type})") from None
-        bits = int("".join(c for c in self.c_type if c.isdigit()))
-        low, high = (0, 2**bits - 1) if self.c_type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-        if not low <= value <= high:
-            raise CompileError(place, f"port '{self.name}': {value} is outside {self.c_type} [{low}, {high}]")
-        macro = f"{'U' if low == 0 else ''}INT{bits}_C"
-        return f"({macro}({value + 1}) - 1)" if value == low and low < 0 else f"{macro}({value})"
+    @property
+    def writes(self) -> bool:
+        """Can the node write through it?"""
+        return self.direction != "in"
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A leaf that the user writes in C. `kind` is the XML name of its node type."""
+    """A node that the user writes in C. `kind` is the XML name of its node type."""
 
     id: str
     kind: str
-    place: Place
+    place: Place = field(compare=False)
     ports: tuple[Port, ...] = ()
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
@@ -94,6 +78,19 @@ class Leaf:
         """Stem of the C functions: `walk_home` of `WalkHome`."""
         return snake(self.id)
 
+    @property
+    def is_inner(self) -> bool:
+        """A control node or decorator."""
+        return self.kind in INNER_KINDS
+
+
+@dataclass
+class Declarations:
+    """What the models of all files declare: the user's nodes, and the ports of trees, by ID."""
+
+    leaves: dict[str, Leaf] = field(default_factory=dict)
+    subtrees: dict[str, tuple[Port, ...]] = field(default_factory=dict)
+
 
 @dataclass
 class _Draft:
@@ -101,22 +98,30 @@ class _Draft:
     ports: list[Port] = field(default_factory=list)
 
 
-def _read_port(element: Element) -> Port:
+def _read_port(element: Element, options: Options) -> Port:
     name = element.attributes.get("name", "")
     if not is_c_identifier(snake(name)) or not name:
         raise CompileError(element.place, f"<{element.tag}> needs a name that can be a C identifier, not '{name}'")
-    type_name = element.attributes.get("type", "")
-    if type_name not in PORT_TYPES:
-        raise CompileError(
-            element.place, f"port '{name}': unsupported type '{type_name}'", nearest(type_name, PORT_TYPES)
-        )
-    return Port(name, PORT_TYPES[type_name], element.attributes.get("default"), element.text.strip(), element.place)
+    kind = read_type(element.attributes.get("type", ""), f"port '{name}'", element.place, options)
+    default = element.attributes.get("default")
+    if default == "" and kind.kind != "text":
+        default = None  # Groot2 writes an empty default where there is none
+    return Port(
+        name,
+        kind,
+        default,
+        element.text.strip(),
+        element.place,
+        PORT_TAGS[element.tag],
+    )
 
 
 def _read_metadata(element: Element, draft: _Draft) -> None:
     for entry in element.children:
         if entry.tag != "Metadata":
-            raise CompileError(entry.place, f"<{entry.tag}> inside <MetadataFields>", "only <Metadata key=…/> goes there")
+            raise CompileError(
+                entry.place, f"<{entry.tag}> inside <MetadataFields>", "only <Metadata key=…/> goes there"
+            )
         for key, value in entry.attributes.items():
             if key not in METADATA:
                 raise CompileError(entry.place, f"unknown metadata '{key}'", nearest(key, METADATA))
@@ -130,24 +135,28 @@ def _one_of(draft: _Draft, key: str, allowed: tuple[str, ...], default: str) -> 
     return value
 
 
-def _read_leaf(element: Element) -> Leaf:
-    leaf_id = element.attributes.get("ID", "")
-    if not leaf_id:
-        raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
+def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
     draft = _Draft()
     for child in element.children:
-        if child.tag == "input_port":
-            draft.ports.append(_read_port(child))
+        if child.tag in PORT_TAGS:
+            port = _read_port(child, options)
+            if any(port.c_name == other.c_name for other in draft.ports):
+                raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
+            draft.ports.append(port)
         elif child.tag == "MetadataFields":
             _read_metadata(child, draft)
-        elif child.tag == "description":
-            continue
-        else:
+        elif child.tag != "description":
             raise CompileError(
                 child.place,
-                f"<{child.tag}> of leaf '{leaf_id}' is not supported",
-                nearest(child.tag, ("input_port", "MetadataFields", "description")),
+                f"<{child.tag}> of '{leaf_id}' is not supported",
+                nearest(child.tag, (*PORT_TAGS, "MetadataFields", "description")),
             )
+    return draft
+
+
+def _read_leaf(element: Element, options: Options) -> Leaf:
+    leaf_id = element.attributes["ID"]
+    draft = _read_draft(element, leaf_id, options)
     if element.tag == "Condition":
         kind = _one_of(draft, "kind", ("Condition",), "Condition")
         if "writes" in draft.metadata:
@@ -156,11 +165,15 @@ def _read_leaf(element: Element) -> Leaf:
                 f"condition '{leaf_id}' declares that it writes",
                 "a Condition only reads; make it an <Action>",
             )
+    elif element.tag in INNER_KINDS:
+        kind = _one_of(draft, "kind", (element.tag,), element.tag)
     else:
         kind = _one_of(draft, "kind", ACTION_KINDS, "StatefulAction")
     state = draft.metadata["state"][0] if "state" in draft.metadata else None
     if state is not None and not is_c_identifier(state):
         raise CompileError(draft.metadata["state"][1], f"metadata state='{state}' is not the name of a C type")
+    if not is_c_identifier(snake(leaf_id)):
+        raise CompileError(element.place, f"'{leaf_id}' cannot be made a C identifier", "choose another ID")
     return Leaf(
         id=leaf_id,
         kind=kind,
@@ -173,25 +186,34 @@ def _read_leaf(element: Element) -> Leaf:
     )
 
 
-def read_leaves(model: Element) -> dict[str, Leaf]:
-    """The leaves that a <TreeNodesModel> declares, by ID.
+def read_model(model: Element, into: Declarations, options: Options, built_in: frozenset[str]) -> None:
+    """Adds what a <TreeNodesModel> declares. The same declaration in several files is accepted.
 
     Raises:
-        CompileError: a declaration is incomplete, not supported, or given twice.
+        CompileError: a declaration is incomplete, not supported, or contradicts another one.
     """
-    leaves: dict[str, Leaf] = {}
+    seen: set[str] = set()
     for element in model.children:
-        if element.tag not in ("Action", "Condition"):
+        if element.tag not in MODEL_TAGS:
             raise CompileError(
-                element.place,
-                f"<{element.tag}> in <TreeNodesModel> is not supported",
-                nearest(element.tag, ("Action", "Condition")),
+                element.place, f"<{element.tag}> in <TreeNodesModel> is not supported", nearest(element.tag, MODEL_TAGS)
             )
-        leaf = _read_leaf(element)
-        same = [other for other in leaves.values() if other.id == leaf.id or other.c_name == leaf.c_name]
-        if same:
+        node_id = element.attributes.get("ID", "")
+        if not node_id:
+            raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
+        if element.tag == "SubTree":
+            into.subtrees[node_id] = tuple(_read_draft(element, node_id, options).ports)
+            continue
+        if node_id in built_in:
+            # Groot2 saves the models of built-in nodes too; what they are is not for the file to say.
+            if "MetadataFields" in (child.tag for child in element.children):
+                raise CompileError(element.place, f"'{node_id}' is the name of a built-in node", "choose another ID")
+            continue
+        leaf = _read_leaf(element, options)
+        same = [other for other in into.leaves.values() if other.id == leaf.id or other.c_name == leaf.c_name]
+        if same and (same[0] != leaf or leaf.id in seen):
             raise CompileError(
-                leaf.place, f"leaf '{leaf.id}' is declared again (or has the same C name)", f"first: {same[0].place}"
+                leaf.place, f"'{leaf.id}' is declared again (or has the same C name)", f"first: {same[0].place}"
             )
-        leaves[leaf.id] = leaf
-    return leaves
+        seen.add(leaf.id)
+        into.leaves.setdefault(leaf.id, leaf)

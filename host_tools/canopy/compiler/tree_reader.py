@@ -1,60 +1,43 @@
 # SPDX-License-Identifier: MIT
-"""XML elements into a tree of nodes, checked: every node is known, has the right children and the right attributes."""
+"""XML elements into a tree of nodes, checked: every node is known, has the right children and the right attributes.
+
+A <SubTree> costs no node: the root of its tree stands in its place, with a scope of names of its own.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_model import Leaf, read_leaves
+from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
+from canopy.compiler.documents import Documents, read_documents
+from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.node_types import NodeType, Parameter, node_types
-from canopy.compiler.xml_reader import Element, read_xml
+from canopy.compiler.port_types import ANY, Options
+from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Context, attributes_node
+from canopy.compiler.tree import Bound, Node, Script, Tree
+from canopy.compiler.xml_reader import Element
+
+__all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree"]
 
 MAX_NODES = 65_534
+MAX_SUBTREE_DEPTH = 1_000
 
 # Attributes that any node may have and that change nothing in a tick.
-PLAIN_ATTRIBUTES = ("name", "_uid", "_description")
+PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath")
+CONDITION_ATTRIBUTES = (*PRECONDITIONS, *POSTCONDITIONS)
 
-# Kinds of the user's own leaves: their names in XML are those of the leaves.
+# Kinds of the user's own nodes: their names in XML are those of the nodes.
 USER_KINDS = ("Condition", "SyncAction", "StatefulAction")
 
 # Rows of nodes.def that are made by the compiler, and are no names in XML.
 INTERNAL = ("Attributes", "Loop", "Switch", "Control", "Decorator")
 
 # Of BehaviorTree.CPP 4, and known to be missing here: refused by name, not as a typing error.
-NOT_SUPPORTED = frozenset(
-    "SubTree Switch2 Switch3 Switch4 Switch5 Switch6 LoopInt LoopBool LoopDouble LoopString Precondition "
-    "SkipUnlessUpdated WaitValueUpdate WasEntryUpdated Script ScriptCondition SetBlackboard UnsetBlackboard TestNode "
-    "ManualSelector".split()
-)
-CONDITION_ATTRIBUTES = frozenset(
-    "_failureIf _successIf _skipIf _while _onSuccess _onFailure _onHalted _post _autoremap".split()
-)
+NOT_SUPPORTED = frozenset(("TestNode", "ManualSelector"))
 
-
-@dataclass
-class Node:
-    """A node of the tree. Leaves have `leaf` and `port_values` (C literals in the order of leaf.ports)."""
-
-    type: NodeType
-    name: str
-    place: Place
-    parameters: tuple[int, ...] = ()
-    leaf: Leaf | None = None
-    port_values: tuple[str, ...] = ()
-    children: list[Node] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Tree:
-    """A checked tree: its ID, the file it came from, the root, and the leaves that the file declares."""
-
-    id: str
-    path: Path
-    root: Node
-    leaves: dict[str, Leaf]
-
+EXPLICIT = {"Action": "LEAF", "Condition": "LEAF", "Control": "CONTROL", "Decorator": "DECORATOR"}
 
 # Least value of a parameter; the others may be any 32-bit number.
 LEAST = {"num_attempts": -1, "num_cycles": -1, "msec": 0, "delay_msec": 0, "then_skip": 0}
@@ -62,151 +45,293 @@ LEAST = {"num_attempts": -1, "num_cycles": -1, "msec": 0, "delay_msec": 0, "then
 THRESHOLDS = ("success_count", "failure_count", "max_failures")
 
 
-def _parameter(element: Element, parameter: Parameter) -> int:
-    name = parameter.name
-    text = element.attributes.get(name, parameter.default)
-    if not text:
-        raise CompileError(element.place, f"<{element.tag}> needs the attribute {name}", f'for example {name}="3"')
-    if text.startswith("{"):
-        raise CompileError(
-            element.place, f"{name}: blackboard entries ({text}) are not supported", "give a literal value"
-        )
-    if text in ("true", "false"):
-        text = "1" if text == "true" else "0"
-    try:
-        value = int(text)
-    except ValueError:
-        raise CompileError(element.place, f"{name}='{text}' is not a whole number") from None
-    least = LEAST.get(name, -(2**31))
-    if not least <= value < 2**31:
-        raise CompileError(element.place, f"{name}={value} is outside [{least}, {2**31 - 1}]")
-    count = len(element.children)
-    if name in THRESHOLDS and not (1 <= value <= count or -count <= value <= -1):
-        raise CompileError(
-            element.place,
-            f"{name}={value} can never be met by {count} children, or needs none",
-            f"1 to {count}, or -1 (all) down to -{count}",
-        )
-    return value
-
-
-def _check_attributes(element: Element, allowed: set[str]) -> None:
-    for attribute in element.attributes:
-        if attribute in CONDITION_ATTRIBUTES:
-            raise CompileError(element.place, f"the attribute {attribute} is not supported", "use nodes instead")
-        if attribute == "catch_on_halt" and element.tag == "TryCatch":
-            if element.attributes[attribute] != "false":
-                raise CompileError(element.place, "catch_on_halt is not supported", "give the last child's work to a halt handler")
-        elif attribute not in allowed:
-            raise CompileError(element.place, f"<{element.tag}> has no attribute '{attribute}'", nearest(attribute, allowed))
-
-
-def _leaf_node(element: Element, leaf: Leaf, *, explicit: bool) -> Node:
-    allowed = {*PLAIN_ATTRIBUTES, *(port.name for port in leaf.ports)} | ({"ID"} if explicit else set())
-    _check_attributes(element, allowed)
-    values = []
-    for port in leaf.ports:
-        text = element.attributes.get(port.name, port.default)
-        if text is None:
-            raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
-        values.append(port.literal(text, element.place))
-    if element.children:
-        raise CompileError(element.children[0].place, f"'{leaf.id}' is a leaf and cannot have children")
-    name = element.attributes.get("name", leaf.id)
-    return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, port_values=tuple(values))
-
-
-def _built_in_node(element: Element, kind: NodeType) -> Node:
-    _check_attributes(element, {*PLAIN_ATTRIBUTES, *(parameter.name for parameter in kind.parameters)})
-    count = len(element.children)
-    if not kind.least_children <= count <= kind.most_children:
-        raise CompileError(element.place, f"<{kind.name}> needs {kind.arity_text()} child node(s), and has {count}")
-    parameters = tuple(_parameter(element, parameter) for parameter in kind.parameters)
-    return Node(kind, element.attributes.get("name", kind.name), element.place, parameters)
-
-
 def built_in_types() -> dict[str, NodeType]:
-    """The node types that XML can name."""
-    hidden = {*USER_KINDS, *INTERNAL, *NOT_SUPPORTED}
+    """The node types that XML can name and that have no script."""
+    hidden = {*USER_KINDS, *INTERNAL, *NOT_SUPPORTED, *SCRIPTED}
     return {name: kind for name, kind in node_types().items() if name not in hidden}
 
 
-def _make_node(element: Element, leaves: dict[str, Leaf]) -> Node:
-    built_in = built_in_types()
-    if element.tag in built_in:
-        return _built_in_node(element, built_in[element.tag])
-    if element.tag in ("Action", "Condition"):
-        leaf_id, explicit = element.attributes.get("ID", ""), True
-    else:
-        leaf_id, explicit = element.tag, False
-    if leaf_id in leaves:
-        leaf = leaves[leaf_id]
-        if explicit and (element.tag == "Condition") != (leaf.kind == "Condition"):
-            raise CompileError(element.place, f"'{leaf_id}' is declared as {leaf.kind}, at {leaf.place}")
-        return _leaf_node(element, leaf, explicit=explicit)
-    if leaf_id in NOT_SUPPORTED:
-        raise CompileError(element.place, f"<{leaf_id}> is not supported yet", f"supported: {', '.join(built_in)}")
-    raise CompileError(element.place, f"unknown node '{leaf_id}'", nearest(leaf_id, [*leaves, *built_in]))
+def _built_in_names() -> frozenset[str]:
+    return frozenset((*built_in_types(), *SCRIPTED, *NOT_SUPPORTED, "SubTree", *EXPLICIT))
 
 
-def _build(top: Element, leaves: dict[str, Leaf]) -> Node:
-    """The tree below one element. A loop, not recursion: trees may be as deep as they are large."""
-    root = _make_node(top, leaves)
-    waiting = [(top, root)]
-    count = 1
-    while waiting:
-        element, node = waiting.pop()
-        for child_element in element.children:
-            count += 1
-            if count > MAX_NODES:
-                raise CompileError(child_element.place, f"the tree has more than {MAX_NODES} nodes")
-            child = _make_node(child_element, leaves)
-            node.children.append(child)
-            if node.leaf is None:
-                waiting.append((child_element, child))
-    return root
+@dataclass
+class _Instance:
+    """One instance of a tree: its scope, its path for the host tools, and the tree IDs that led to it."""
+
+    scope: Scope
+    path: str
+    chain: tuple[str, ...]
+    names: dict[str, int] = field(default_factory=dict)
+
+    def unique(self, name: str) -> str:
+        """`name`, with `::2` and so on from the second use in this instance on."""
+        self.names[name] = self.names.get(name, 0) + 1
+        return name if self.names[name] == 1 else f"{name}::{self.names[name]}"
 
 
-def _choose_tree(root: Element, trees: dict[str, Element]) -> str:
-    wanted = root.attributes.get("main_tree_to_execute")
-    if wanted is None:
-        if len(trees) == 1:
-            return next(iter(trees))
-        raise CompileError(root.place, "several trees, and no main_tree_to_execute says which", nearest("", trees))
-    if wanted not in trees:
-        raise CompileError(root.place, f"main_tree_to_execute='{wanted}' is not a tree of this file", nearest(wanted, trees))
-    return wanted
+class _Builder:
+    def __init__(self, documents: Documents, options: Options) -> None:
+        self._trees = documents.trees
+        self._models = documents.declarations
+        self._built_in = built_in_types()
+        self.context = Context(options, Blackboard())
+        self._count = 0
+
+    def build(self, tree_id: str) -> Node:
+        """The whole tree. A loop, not recursion: trees may be as deep as they are large."""
+        main = _Instance(self.context.board.main, tree_id, (tree_id,))
+        self._main_ports(main.scope, tree_id)
+        root, inner, element, instance = self._expand(self._trees[tree_id].children[0], main)
+        waiting = [(inner, element, instance)]
+        while waiting:
+            node, element, instance = waiting.pop()
+            for child_element in element.children:
+                outer, inner, inner_element, inner_instance = self._expand(child_element, instance)
+                node.children.append(outer)
+                if inner_element.children:
+                    waiting.append((inner, inner_element, inner_instance))
+        return root
+
+    def _main_ports(self, scope: Scope, tree_id: str) -> None:
+        """The ports of the main tree are what the program itself writes and reads."""
+        for port in self._models.subtrees.get(tree_id, ()):
+            entry = scope.resolve(port.name, port.place)
+            if isinstance(entry, Entry):
+                entry.initial = port.default
+                entry.uses.append(Use(port.type, port.place, f"port '{port.name}' of the main tree", True))
+
+    def _counted(self, node: Node) -> Node:
+        self._count += 1
+        if self._count > MAX_NODES:
+            raise CompileError(node.place, f"the tree has more than {MAX_NODES} nodes")
+        return node
+
+    def _expand(self, element: Element, instance: _Instance) -> tuple[Node, Node, Element, _Instance]:
+        """The node of an element, below the nodes of its attributes; for a SubTree, the root of its tree.
+
+        Gives the outermost node, and the innermost one with its element and instance.
+        """
+        outermost: Node | None = None
+        above: Node | None = None
+        while True:
+            attributes = attributes_node(self.context, element, instance.scope)
+            is_subtree = element.tag == "SubTree"
+            node = None if is_subtree else self._make(element, instance)
+            for new in (attributes, node):
+                if new is None:
+                    continue
+                self._counted(new)
+                new.path = f"{instance.path}/{instance.unique(new.name)}"
+                if above is not None:
+                    above.children.append(new)
+                outermost = outermost or new
+                above = new
+            if node is not None:
+                assert outermost is not None
+                return outermost, node, element, instance
+            instance = self._enter(element, instance)
+            element = self._trees[instance.chain[-1]].children[0]
+
+    def _enter(self, element: Element, outer: _Instance) -> _Instance:
+        """A new instance of the tree that a <SubTree> names."""
+        tree_id = element.attributes.get("ID", "")
+        if tree_id not in self._trees:
+            raise CompileError(
+                element.attribute_place("ID"), f"<SubTree> names no tree: '{tree_id}'", nearest(tree_id, self._trees)
+            )
+        if tree_id in outer.chain:
+            loop = " -> ".join((*outer.chain[outer.chain.index(tree_id) :], tree_id))
+            raise CompileError(element.place, f"trees contain each other in a cycle: {loop}", "a tree has an end")
+        if len(outer.chain) > MAX_SUBTREE_DEPTH:
+            raise CompileError(element.place, f"subtrees are nested more than {MAX_SUBTREE_DEPTH} deep")
+        if element.children:
+            raise CompileError(element.children[0].place, f"<SubTree ID='{tree_id}'> cannot have children")
+        name = outer.unique(element.attributes.get("name", tree_id))
+        path = f"{outer.scope.path}/{name}".lstrip("/")
+        autoremap = element.attributes.get("_autoremap", "false")
+        if autoremap.lower() not in ("true", "false", "1", "0"):
+            raise CompileError(
+                element.attribute_place("_autoremap"), f"_autoremap='{autoremap}' is neither true nor false"
+            )
+        scope = Scope(self.context.board, path, outer.scope, autoremap=autoremap.lower() in ("true", "1"))
+        self._connect(element, scope, tree_id)
+        return _Instance(scope, f"{outer.path}/{name}", (*outer.chain, tree_id))
+
+    def _connect(self, element: Element, scope: Scope, tree_id: str) -> None:
+        plain = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, "ID", "_autoremap"}
+        ports = {port.name: port for port in self._models.subtrees.get(tree_id, ())}
+        for name, text in element.attributes.items():
+            if name in plain:
+                continue
+            if name.startswith("_"):
+                raise CompileError(
+                    element.attribute_place(name), f"<SubTree> has no attribute '{name}'", nearest(name, plain)
+                )
+            if not name.isidentifier():
+                raise CompileError(element.attribute_place(name), f"'{name}' cannot be the name of a port")
+            scope.connect(name, text, element.attribute_place(name))
+        for port in ports.values():
+            if port.name not in scope.names and not scope.autoremap:
+                if port.default is None and not port.writes:
+                    raise CompileError(
+                        element.place,
+                        f"<SubTree ID='{tree_id}'> needs a value for its port '{port.name}'",
+                        f"declared at {port.place}",
+                    )
+                if port.default is not None:
+                    scope.connect(port.name, port.default, port.place)
+            target = scope.resolve(port.name, port.place)
+            if isinstance(target, Entry):
+                target.uses.append(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
+
+    def _make(self, element: Element, instance: _Instance) -> Node:
+        node_id = element.attributes.get("ID", "") if element.tag in EXPLICIT else element.tag
+        if node_id in SCRIPTED:
+            node = SCRIPTED[node_id](self.context, element, instance.scope, node_id)
+            self._check_plain(element)
+        elif node_id in self._built_in:
+            node = self._built_in_node(element, self._built_in[node_id], instance.scope)
+        elif node_id in self._models.leaves:
+            node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
+        elif node_id in NOT_SUPPORTED:
+            raise CompileError(
+                element.place, f"<{node_id}> is not supported", "declare a node of your own in its place"
+            )
+        elif element.tag in EXPLICIT and not node_id:
+            raise CompileError(element.place, f"<{element.tag}> needs the attribute ID")
+        else:
+            known = [*self._models.leaves, *self._built_in, *SCRIPTED]
+            hint = f'it is a tree: <SubTree ID="{node_id}"/>' if node_id in self._trees else nearest(node_id, known)
+            raise CompileError(element.place, f"unknown node '{node_id}'", hint)
+        wanted = EXPLICIT.get(element.tag)
+        is_condition = node.type.name == "Condition"
+        if wanted is not None and (
+            wanted != node.type.category
+            or (node.leaf is not None and (element.tag == "Condition") != is_condition and wanted == "LEAF")
+        ):
+            where = f", at {node.leaf.place}" if node.leaf is not None else ""
+            kind = node.leaf.kind if node.leaf is not None else node.type.category.lower()
+            raise CompileError(element.place, f"'{node_id}' is declared as {kind}{where}")
+        count = len(element.children)
+        if node.leaf is not None and not node.leaf.is_inner and count:
+            raise CompileError(element.children[0].place, f"'{node_id}' is a leaf and cannot have children")
+        if not node.type.least_children <= count <= node.type.most_children:
+            raise CompileError(
+                element.place, f"<{node_id}> needs {node.type.arity_text()} child node(s), and has {count}"
+            )
+        return node
+
+    def _check_plain(self, element: Element) -> None:
+        allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES}
+        for name in element.attributes:
+            if name.startswith("_") and name not in allowed:
+                raise CompileError(
+                    element.attribute_place(name), f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed)
+                )
+
+    def _check_attributes(self, element: Element, own: set[str]) -> None:
+        allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, *own} | ({"ID"} if element.tag in EXPLICIT else set())
+        for name in element.attributes:
+            if name not in allowed:
+                raise CompileError(element.place, f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed))
+
+    def _leaf_node(self, element: Element, leaf: Leaf, scope: Scope) -> Node:
+        self._check_attributes(element, {port.name for port in leaf.ports})
+        bound = tuple(self._bind(element, leaf, port, scope) for port in leaf.ports)
+        name = element.attributes.get("name", leaf.id)
+        return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
+
+    def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
+        # Groot2 writes an empty attribute for a port that nothing is connected to.
+        given = port.name in element.attributes and (element.attributes[port.name] != "" or port.type.kind == "text")
+        text = element.attributes[port.name] if given else port.default
+        place = element.attribute_place(port.name) if given else element.place
+        if text is None:
+            if port.direction == "out":
+                return Bound(port, place)
+            raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
+        name = pointer(text, port.name)
+        if name is None:
+            if port.writes:
+                raise CompileError(
+                    place,
+                    f"port '{port.name}' of '{leaf.id}' is written, and '{text}' is a literal",
+                    "give an entry: {name}",
+                )
+            return Bound(port, place, text=text)
+        target = scope.resolve(name, place)
+        if isinstance(target, Entry):
+            target.uses.append(Use(port.type, place, f"port '{port.name}' of '{leaf.id}'", port.writes))
+        elif port.writes:
+            raise CompileError(place, f"port '{port.name}' of '{leaf.id}' is written, and '{name}' is a signal")
+        return Bound(port, place, target=target)
+
+    def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
+        own = {parameter.name for parameter in kind.parameters}
+        if kind.name == "TryCatch":
+            own.add("catch_on_halt")
+            if element.attributes.get("catch_on_halt", "false") != "false":
+                raise CompileError(
+                    element.place, "catch_on_halt is not supported", "give the last child's work to a halt handler"
+                )
+        self._check_attributes(element, own)
+        parameters = tuple(self._parameter(element, parameter, scope) for parameter in kind.parameters)
+        name = element.attributes.get("name", kind.name)
+        return Node(kind, name, element.place, parameters, xml_name=kind.name)
+
+    def _parameter(self, element: Element, parameter: Parameter, scope: Scope) -> int | Script:
+        name = parameter.name
+        text = element.attributes.get(name, parameter.default)
+        if not text:
+            raise CompileError(element.place, f"<{element.tag}> needs the attribute {name}", f'for example {name}="3"')
+        if pointer(text, name) is not None:
+            return self._entry_parameter(element, name, scope)
+        if text in ("true", "false"):
+            text = "1" if text == "true" else "0"
+        try:
+            value = int(text)
+        except ValueError:
+            raise CompileError(element.place, f"{name}='{text}' is not a whole number") from None
+        least = LEAST.get(name, -(2**31))
+        if not least <= value < 2**31:
+            raise CompileError(element.place, f"{name}={value} is outside [{least}, {2**31 - 1}]")
+        count = len(element.children)
+        if name in THRESHOLDS and not (1 <= value <= count or -count <= value <= -1):
+            raise CompileError(
+                element.place,
+                f"{name}={value} can never be met by {count} children, or needs none",
+                f"1 to {count}, or -1 (all) down to -{count}",
+            )
+        return value
+
+    def _entry_parameter(self, element: Element, name: str, scope: Scope) -> Script:
+        script = self.context.script("parameter", element, name, scope)
+        inner = pointer(script.text, name)
+        assert inner is not None
+        script.target = scope.resolve(inner, script.place())
+        script.least = LEAST.get(name, -(2**31))
+        if isinstance(script.target, Entry):
+            script.target.uses.append(Use(ANY, script.place(), f"<{element.tag} {name}>", False))
+        return script
 
 
-def read_tree(path: Path) -> Tree:
-    """The main tree of an XML file in BehaviorTree.CPP's format 4.
+def read_tree(path: Path, options: Options | None = None) -> Tree:
+    """The main tree of an XML file in BehaviorTree.CPP's format 4, with its subtrees expanded.
 
     Raises:
-        CompileError: anything in the file that cannot be compiled.
+        CompileError: anything in the file, or in those it includes, that cannot be compiled.
     """
-    root = read_xml(path)
-    if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
-        raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
-    trees: dict[str, Element] = {}
-    leaves: dict[str, Leaf] = {}
-    for element in root.children:
-        if element.tag == "BehaviorTree":
-            tree_id = element.attributes.get("ID", "")
-            if not tree_id or tree_id in trees:
-                raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'")
-            trees[tree_id] = element
-        elif element.tag == "TreeNodesModel":
-            leaves |= read_leaves(element)
-            for leaf in leaves.values():
-                if leaf.id in built_in_types() or leaf.id in NOT_SUPPORTED:
-                    raise CompileError(leaf.place, f"'{leaf.id}' is the name of a built-in node", "choose another ID")
-        else:
-            allowed = ("BehaviorTree", "TreeNodesModel")
-            raise CompileError(element.place, f"<{element.tag}> is not supported here", nearest(element.tag, allowed))
-    if not trees:
-        raise CompileError(root.place, "no <BehaviorTree> in this file")
-    tree_id = _choose_tree(root, trees)
-    top = trees[tree_id]
-    if len(top.children) != 1:
-        raise CompileError(top.place, f"<BehaviorTree ID='{tree_id}'> needs exactly 1 node, and has {len(top.children)}")
-    return Tree(tree_id, path, _build(top.children[0], leaves), leaves)
+    options = options or Options()
+    documents = read_documents(path, options, _built_in_names())
+    builder = _Builder(documents, options)
+    root = builder.build(documents.main)
+    return Tree(
+        id=documents.main,
+        path=path,
+        root=root,
+        leaves=documents.declarations.leaves,
+        files=tuple(documents.files),
+        board=builder.context.board,
+        scripts=tuple(builder.context.scripts),
+    )

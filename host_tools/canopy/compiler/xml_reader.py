@@ -7,6 +7,7 @@ document type declaration is refused, and with it every entity trick.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -26,6 +27,34 @@ class Element:
     place: Place
     children: list[Element] = field(default_factory=list)
     text: str = ""
+    source: bytes = field(default=b"", repr=False)
+    offset: int = 0
+
+    def attribute_place(self, name: str, index: int = 0) -> Place:
+        """The place of character `index` of an attribute's value; the tag's place when the value cannot be found.
+
+        Expat gives no places of attributes, so the tag is read again; `&lt;` and the like are one character.
+        """
+        position = _TAG_NAME.match(self.source, self.offset)
+        while position is not None:
+            attribute = _ATTRIBUTE.match(self.source, position.end())
+            if attribute is not None and attribute["name"] == name.encode():
+                value = attribute["value"][1:-1]
+                before = b"".join(_CHARACTER.findall(value)[:index])
+                return self._place_of(attribute.start("value") + 1 + len(before))
+            position = attribute
+        return self.place
+
+    def _place_of(self, offset: int) -> Place:
+        before = self.source[self.offset : offset].decode("utf-8", errors="replace")
+        lines = before.count("\n")
+        column = len(before) - before.rfind("\n") if lines else self.place.column + len(before)
+        return Place(self.place.file, self.place.line + lines, column)
+
+
+_TAG_NAME = re.compile(rb"<[^\s/>]+")
+_ATTRIBUTE = re.compile(rb"\s+(?P<name>[^\s=/>]+)\s*=\s*(?P<value>\"[^\"]*\"|'[^']*')")
+_CHARACTER = re.compile(rb"&[^;]*;|[\x00-\x7f\xc0-\xff][\x80-\xbf]*", re.DOTALL)
 
 
 class _Builder:
@@ -38,12 +67,13 @@ class _Builder:
         self._parser.StartDoctypeDeclHandler = self._doctype
         self._open: list[Element] = []
         self._root: Element | None = None
+        self._data = b""
 
     def _here(self) -> Place:
         return Place(self._file, self._parser.CurrentLineNumber, self._parser.CurrentColumnNumber + 1)
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, self._here())
+        element = Element(tag, attributes, self._here(), source=self._data, offset=self._parser.CurrentByteIndex)
         if self._open:
             self._open[-1].children.append(element)
         else:
@@ -65,6 +95,7 @@ class _Builder:
         )
 
     def parse(self, data: bytes) -> Element:
+        self._data = data
         try:
             self._parser.Parse(data, True)
         except expat.ExpatError as error:

@@ -27,6 +27,7 @@ typedef struct {
     const canopy_bus_t *bus;
     const canopy_trace_config_t *trace;
     void *memory; /**< The application's one static object; handed to the leaves' functions. The rest lies in it: */
+    void (*start)(void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
     canopy_tree_instance_t *tree_instance;
     uint8_t *status;              /**< tree->node_count. */
     uint16_t *words;              /**< tree->word_count. */

@@ -89,10 +89,12 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
     return all_skipped;
 }
 
-/** A parameter of a built-in node, as written in the XML; `which` counts in the order of nodes.def. */
+/** A parameter of a built-in node, from the XML or from an entry; `which` counts in the order of nodes.def. */
 static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node, unsigned which)
 {
-    return self->tree->parameters[self->tree->nodes[node].parameter + which];
+    int32_t value = self->tree->parameters[self->tree->nodes[node].parameter + which];
+
+    return ((self->tree->nodes[node].asks >> which) & 1u) != 0u ? self->tree->scripts[value](self->application) : value;
 }
 
 /** Runs the script that a parameter of the node names; 0 when it names none. */

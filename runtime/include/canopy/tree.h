@@ -38,7 +38,7 @@ typedef enum {
  */
 typedef struct {
     uint8_t type;       /**< canopy_node_type_t. */
-    uint8_t reserved;   /**< 0. */
+    uint8_t asks;       /**< Bit i: parameter i is a script that gives the value in each tick. Else 0. */
     uint16_t parent;    /**< Index of the parent; the root names itself, 0. */
     uint16_t end;       /**< Index after the last descendant. */
     uint16_t state;     /**< First of its state words, after those of earlier nodes; any value if it has none. */

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""A tree file and the files it includes: the trees by ID, which one is the main tree, and what the models declare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.leaf_model import Declarations, read_model
+from canopy.compiler.port_types import Options
+from canopy.compiler.xml_reader import Element, read_xml
+
+ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
+
+
+@dataclass
+class Documents:
+    """All files of an application. `files` is in the order of reading, the main file first."""
+
+    files: list[Path] = field(default_factory=list)
+    trees: dict[str, Element] = field(default_factory=dict)
+    main: str = ""
+    declarations: Declarations = field(default_factory=Declarations)
+
+
+class _Reader:
+    def __init__(self, options: Options, built_in: frozenset[str]) -> None:
+        self._options = options
+        self._built_in = built_in
+        self.documents = Documents()
+
+    def read(self, path: Path) -> Element:
+        """Reads a file and, depth first, what it includes. The files that are open are in `chain`."""
+        top = self._read_root(path)
+        waiting = [(top, iter(top.children), path)]
+        while waiting:
+            _root, elements, file = waiting[-1]
+            element = next(elements, None)
+            if element is None:
+                waiting.pop()
+            elif element.tag == "include":
+                target = self._included(element, file)
+                chain = [open_file for _, _, open_file in waiting]
+                if target in [open_file.resolve() for open_file in chain]:
+                    names = " -> ".join([*(open_file.name for open_file in chain), target.name])
+                    raise CompileError(element.place, f"files include each other in a loop: {names}")
+                if target not in [known.resolve() for known in self.documents.files]:
+                    inner = self._read_root(file.parent / element.attributes["path"], element)
+                    waiting.append((inner, iter(inner.children), file.parent / element.attributes["path"]))
+            else:
+                self._take(element)
+        return top
+
+    def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
+        if included_by is not None and not path.is_file():
+            place = included_by.attribute_place("path")
+            raise CompileError(place, f"the included file '{path}' is not there", "paths are relative to this file")
+        self.documents.files.append(path)
+        root = read_xml(path)
+        if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
+            raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
+        return root
+
+    def _included(self, element: Element, file: Path) -> Path:
+        for attribute in element.attributes:
+            if attribute == "ros_pkg":
+                raise CompileError(
+                    element.place, "<include ros_pkg=…> is not supported", "give the file's path, relative to this file"
+                )
+            if attribute != "path":
+                raise CompileError(element.place, f"<include> has no attribute '{attribute}'", "did you mean 'path'?")
+        if not element.attributes.get("path"):
+            raise CompileError(element.place, "<include> needs the attribute path", 'for example path="other.xml"')
+        return (file.parent / element.attributes["path"]).resolve()
+
+    def _take(self, element: Element) -> None:
+        if element.tag == "BehaviorTree":
+            tree_id = element.attributes.get("ID", "")
+            if not tree_id or tree_id in self.documents.trees:
+                first = f"the other one: {self.documents.trees[tree_id].place}" if tree_id else ""
+                raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
+            if len(element.children) != 1:
+                raise CompileError(
+                    element.place,
+                    f"<BehaviorTree ID='{tree_id}'> needs exactly 1 node, and has {len(element.children)}",
+                )
+            self.documents.trees[tree_id] = element
+        elif element.tag == "TreeNodesModel":
+            read_model(element, self.documents.declarations, self._options, self._built_in)
+        else:
+            raise CompileError(
+                element.place, f"<{element.tag}> is not supported here", nearest(element.tag, ROOT_CHILDREN)
+            )
+
+
+def _choose_tree(root: Element, trees: dict[str, Element]) -> str:
+    wanted = root.attributes.get("main_tree_to_execute")
+    if wanted is not None:
+        if wanted not in trees:
+            raise CompileError(
+                root.attribute_place("main_tree_to_execute"),
+                f"main_tree_to_execute='{wanted}' is not a tree of this file or of those it includes",
+                nearest(wanted, trees),
+            )
+        return wanted
+    own = [tree_id for tree_id, element in trees.items() if element.place.file == root.place.file]
+    for candidates in (own, list(trees)):
+        if len(candidates) == 1:
+            return candidates[0]
+    raise CompileError(root.place, "several trees, and no main_tree_to_execute says which", nearest("", trees))
+
+
+def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Documents:
+    """Reads a tree file and all that it includes.
+
+    Raises:
+        CompileError: a file cannot be read, is no tree file, or includes itself.
+    """
+    reader = _Reader(options, built_in)
+    root = reader.read(path)
+    documents = reader.documents
+    if not documents.trees:
+        raise CompileError(Place(root.place.file, 1, 1), "no <BehaviorTree> in this file")
+    documents.main = _choose_tree(root, documents.trees)
+    return documents

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The user's nodes in C: types of ports, prototypes, and the arguments that the generated code calls them with."""
+
+from __future__ import annotations
+
+from canopy.compiler.blackboard import Entry
+from canopy.compiler.bus_reader import Bus
+from canopy.compiler.leaf_model import Leaf, Port
+
+TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
+
+
+def stale_test(bus: Bus, leaf: Leaf) -> str:
+    """C: is something that the leaf reads not known? A multiplexed signal that it names must have come, too."""
+    flags = {(m.name, s.name): s.has_name for m in bus.receive for s in m.multiplexed}
+    names = {m.name: m.c_name for m in bus.receive}
+    reads = sorted(
+        {
+            (names[message], flags.get((message, signal), "fresh"))
+            for message, _, signal in (name.partition(".") for name in leaf.reads)
+        }
+    )
+    return " || ".join(f"!app->input.{message}.{flag}" for message, flag in reads)
+
+
+def parameters(leaf: Leaf, bus: Bus, before: str = "") -> str:
+    """The parameters of the user's functions; `before` stands in front."""
+    parts = [before] if before else []
+    parts.append(f"const {bus.name}_input_t *in")
+    if leaf.writes:
+        parts.append(f"{bus.name}_output_t *out")
+    if leaf.ports:
+        parts.append(f"const {leaf.c_name}_ports_t *ports")
+    if leaf.state:
+        parts.append(f"{leaf.state} *self")
+    return ", ".join(parts)
+
+
+def arguments(leaf: Leaf, *, copies: bool = False, before: str = "") -> str:
+    """The arguments for these parameters, in a function of the generated code that has `app` and `parameter`."""
+    parts = [before] if before else []
+    parts.append("&app->input")
+    if leaf.writes:
+        parts.append("&app->output")
+    if leaf.ports:
+        parts.append("&ports" if copies else f"&{leaf.c_name}_ports[parameter]")
+    if leaf.state:
+        parts.append(f"&app->{leaf.c_name}[parameter]")
+    return ", ".join(parts)
+
+
+def prototypes(leaf: Leaf, bus: Bus) -> list[str]:
+    """The functions that the user writes, without the final semicolon."""
+    name = leaf.c_name
+    if leaf.is_inner:
+        child = f"{TREE_PARAMETERS}, uint16_t child, canopy_status_t status"
+        return [
+            f"canopy_step_t {name}_enter({parameters(leaf, bus, TREE_PARAMETERS)})",
+            f"canopy_step_t {name}_child({parameters(leaf, bus, child)})",
+            f"void {name}_halt({parameters(leaf, bus, TREE_PARAMETERS)})",
+        ]
+    own = parameters(leaf, bus)
+    if leaf.kind == "StatefulAction":
+        return [
+            f"canopy_status_t {name}_on_start({own})",
+            f"canopy_status_t {name}_on_running({own})",
+            f"void {name}_on_halted({own})",
+        ]
+    return [f"canopy_status_t {name}_tick({own})"]
+
+
+def _spaced(c_type: str) -> str:
+    return c_type if c_type.endswith("*") else f"{c_type} "
+
+
+def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[tuple[str, str]]:
+    """(declaration, comment) of the members of the ports struct that a port becomes."""
+    notes = [port.description] if port.description else []
+    if port.type.kind == "duration":
+        notes.insert(0, "[ms]")
+    if not port.writes:
+        c_type = f"const {port.type.c} *" if port.type.kind == "user" else port.type.c
+        return [(f"{_spaced(c_type)}{port.c_name};", " ".join(notes))]
+    notes.append(f"Written with {leaf.c_name}_set_{port.c_name}().")
+    members = [(f"{port.type.c} *{port.c_name};", " ".join(notes))]
+    if (leaf.id, port.name) in counted:
+        members.append((f"uint32_t *{port.c_name}_updates;", "Counts the writes, for nodes that wait for them."))
+    return members
+
+
+def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
+    """The C functions with which the user writes output ports, one text each."""
+    functions = []
+    for port in leaf.ports:
+        if not port.writes:
+            continue
+        is_user = port.type.kind == "user"
+        value = f"const {port.type.c} *value" if is_user else f"{port.type.c} value"
+        lines = [
+            f"/** Writes port {port.name}. Nothing happens where the tree does not connect it. */",
+            f"static inline void {leaf.c_name}_set_{port.c_name}(const {leaf.c_name}_ports_t *ports, {value})",
+            "{",
+            f"    if (ports->{port.c_name} != NULL) {{",
+            f"        *ports->{port.c_name} = {'*' if is_user else ''}value;",
+            "    }",
+        ]
+        if (leaf.id, port.name) in counted:
+            lines += [
+                f"    if (ports->{port.c_name}_updates != NULL) {{",
+                f"        (*ports->{port.c_name}_updates)++;",
+                "    }",
+            ]
+        functions.append("\n".join([*lines, "}"]))
+    return functions
+
+
+def entry_type(entry: Entry) -> str:
+    """The C type of an entry's member. Texts are places in the table of texts."""
+    return "uint16_t" if entry.type.kind == "text" else entry.type.c

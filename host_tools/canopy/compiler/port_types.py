@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""Types of ports and blackboard entries: the C++ and C names that models use, and what they are in C."""
+
+from __future__ import annotations
+
+import difflib
+import html
+import re
+from dataclasses import dataclass, field
+from typing import Literal
+
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.names import is_c_identifier
+
+Kind = Literal["bool", "int", "duration", "float", "text", "user", "any"]
+
+
+@dataclass(frozen=True)
+class PortType:
+    """A type. `c` is the C type of an entry or port; `low` and `high` are the limits of whole numbers.
+
+    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items.
+    """
+
+    kind: Kind
+    c: str
+    low: int = 0
+    high: int = 0
+    item: str = ""
+    capacity: int = 0
+
+    def __str__(self) -> str:
+        return {"text": "a constant text", "duration": "a duration [ms]", "any": "any type"}.get(self.kind, self.c)
+
+    @property
+    def is_number(self) -> bool:
+        """Can scripts compute with it?"""
+        return self.kind in ("bool", "int", "duration", "float")
+
+
+def _integer(bits: int, *, signed: bool) -> PortType:
+    low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    return PortType("int", f"{'' if signed else 'u'}int{bits}_t", low, high)
+
+
+BOOL = PortType("bool", "bool", 0, 1)
+INT32 = _integer(32, signed=True)
+INT64 = _integer(64, signed=True)
+DURATION = PortType("duration", "uint32_t", 0, 2**32 - 1)
+DOUBLE = PortType("float", "double")
+TEXT = PortType("text", "const char *")
+ANY = PortType("any", "")
+
+# Spellings on the left: C, C++, and what compilers print for C++ types.
+PORT_TYPES: dict[str, PortType] = {
+    "bool": BOOL,
+    **{f"{u}int{bits}_t": _integer(bits, signed=not u) for u in ("", "u") for bits in (8, 16, 32, 64)},
+    "int": INT32,
+    "unsigned": _integer(32, signed=False),
+    "unsigned int": _integer(32, signed=False),
+    "short": _integer(16, signed=True),
+    "unsigned short": _integer(16, signed=False),
+    "signed char": _integer(8, signed=True),
+    "unsigned char": _integer(8, signed=False),
+    "long": INT64,
+    "unsigned long": _integer(64, signed=False),
+    "size_t": _integer(64, signed=False),
+    "float": PortType("float", "float"),
+    "double": DOUBLE,
+    "std::string": TEXT,
+    "std::string_view": TEXT,
+    "const char *": TEXT,
+    "std::basic_string<char,std::char_traits<char>,std::allocator<char>>": TEXT,
+    "std::chrono::milliseconds": DURATION,
+    "std::chrono::duration<long,std::ratio<1,1000>>": DURATION,
+    "duration": DURATION,
+    "": ANY,
+    "AnyTypeAllowed": ANY,
+    "BT::AnyTypeAllowed": ANY,
+    "BT::Any": ANY,
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line says about types."""
+
+    floats: bool = False
+    type_map: dict[str, str] = field(default_factory=dict)
+    include: str | None = None
+
+
+def _normal(name: str) -> str:
+    """One spelling for `std::vector< int >`, `std::__cxx11::basic_string<…>`, `std::ratio<1l, 1000l>`, `&lt;`."""
+    text = html.unescape(name).strip().replace("std::__cxx11::", "std::").replace("std::__1::", "std::")
+    text = re.sub(r"\s*([<>,*])\s*", r"\1", text)
+    text = re.sub(r"\b(\d+)[lL]+\b", r"\1", text).replace("const char*", "const char *")
+    return re.sub(r"\s+", " ", text.removeprefix("const ") if "*" not in text else text)
+
+
+_QUEUE = re.compile(r"(?P<item>[\w ]+?) ?\[(?P<capacity>\d{1,5})\]")
+MAX_CAPACITY = 65_535
+
+
+def _queue(item: PortType, capacity: int, where: str, place: Place) -> PortType:
+    if item.kind not in ("bool", "int", "float") or not 1 <= capacity <= MAX_CAPACITY:
+        raise CompileError(place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers", "for example type='int32_t[8]'")
+    return PortType("user", f"canopy_queue_{item.c.removesuffix('_t')}_{capacity}_t", item=item.c, capacity=capacity)
+
+
+def read_type(name: str, where: str, place: Place, options: Options) -> PortType:
+    """The type of that name. `where` says whose it is, for messages.
+
+    Raises:
+        CompileError: it is no known type, or one that this application does not allow.
+    """
+    normal = _normal(name)
+    mapped = {_normal(key): value for key, value in options.type_map.items()}
+    normal = mapped.get(normal, normal)
+    known = PORT_TYPES.get(normal) or PORT_TYPES.get(normal.removeprefix("std::"))
+    if known is not None:
+        if known.kind == "float" and not options.floats:
+            raise CompileError(
+                place,
+                f"{where}: type '{name}' is floating point, which this application does not allow",
+                "use whole numbers of a smaller unit, or compile with --allow-floating-point",
+            )
+        return known
+    queue = _QUEUE.fullmatch(normal)
+    if queue is not None:
+        return _queue(read_type(queue["item"], where, place, options), int(queue["capacity"]), where, place)
+    if not is_c_identifier(normal):
+        raise CompileError(
+            place,
+            f"{where}: unsupported type '{name}'",
+            f"give the C type of yours that stands for it: --type-map '{normal}=my_type_t'",
+        )
+    close = difflib.get_close_matches(normal, [n for n in PORT_TYPES if n], n=1, cutoff=0.85)
+    if normal not in mapped.values() and close:
+        raise CompileError(place, f"{where}: unsupported type '{name}'", f"did you mean '{close[0]}'?")
+    if options.include is None:
+        raise CompileError(
+            place,
+            f"{where}: unsupported type '{name}'",
+            "if it is a C type of yours, name its header with --include; else use one of: "
+            + ", ".join(sorted({t.c for t in PORT_TYPES.values() if t.c})),
+        )
+    return PortType("user", normal)
+
+
+def literal(text: str, kind: PortType, where: str, place: Place) -> str:
+    """The C literal of a value of that type.
+
+    Raises:
+        CompileError: the text is not a value of the type.
+    """
+    if kind.kind == "bool":
+        if text.lower() not in ("true", "false", "0", "1"):
+            raise CompileError(place, f"{where}: '{text}' is not a bool", "write true or false")
+        return "true" if text.lower() in ("true", "1") else "false"
+    if kind.kind == "text":
+        return c_string(text)
+    if kind.kind == "float":
+        try:
+            value = float(text)
+        except ValueError:
+            raise CompileError(place, f"{where}: '{text}' is not a number ({kind.c})") from None
+        if value != value or value in (float("inf"), float("-inf")):
+            raise CompileError(place, f"{where}: '{text}' is not a finite number")
+        return repr(value) + ("f" if kind.c == "float" else "")
+    if kind.kind == "user":
+        if not is_c_identifier(text):
+            raise CompileError(
+                place,
+                f"{where}: '{text}' cannot be a value of your type {kind.c}",
+                "name a constant of that type (an enum's), or connect an entry: {name}",
+            )
+        return text
+    return integer(text, kind, where, place)
+
+
+def integer(text: str, kind: PortType, where: str, place: Place) -> str:
+    """The C literal of a whole number."""
+    try:
+        value = int(text, 0)
+    except ValueError:
+        raise CompileError(place, f"{where}: '{text}' is not a whole number ({kind.c})") from None
+    if not kind.low <= value <= kind.high:
+        raise CompileError(place, f"{where}: {value} is outside {kind.c} [{kind.low}, {kind.high}]")
+    bits = int("".join(c for c in kind.c if c.isdigit()))
+    macro = f"{'U' if kind.low == 0 else ''}INT{bits}_C"
+    return f"({macro}({value + 1}) - 1)" if value == kind.low and value < 0 else f"{macro}({value})"
+
+
+def c_string(text: str) -> str:
+    """A C string literal with exactly these characters, in UTF-8."""
+    escaped = "".join(
+        f"\\{chr(byte)}" if byte in b'"\\' else chr(byte) if 32 <= byte < 127 and byte != 63 else f"\\{byte:03o}"
+        for byte in text.encode()
+    )
+    return f'"{escaped}"'

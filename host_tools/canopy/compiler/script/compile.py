@@ -1,0 +1,399 @@
+# SPDX-License-Identifier: MIT
+"""Statements and names of scripts: what a name stands for, and how a value is stored."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from canopy.compiler.blackboard import Entry, Scope, SignalName
+from canopy.compiler.bus_reader import Bus, Message, Signal
+from canopy.compiler.codec import value_type
+from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.names import snake
+from canopy.compiler.port_types import PortType
+from canopy.compiler.script.arithmetic import Arithmetic
+from canopy.compiler.script.syntax import (
+    Assignment,
+    Binary,
+    Comparison,
+    Conditional,
+    Expression,
+    Name,
+    Number,
+    ScriptError,
+    Text,
+    Unary,
+)
+from canopy.compiler.script.values import (
+    INT64,
+    Const,
+    Double,
+    Num,
+    TextConst,
+    TextVar,
+    Value,
+    boolean,
+    common_scale,
+    describe,
+    number,
+    plain,
+)
+
+FAULTS = "&app->entries.script_faults"
+
+
+class UntypedError(Exception):
+    """An entry whose type is not known yet."""
+
+
+class Texts:
+    """The application's table of texts: each one once, in the order in which they were first met."""
+
+    def __init__(self) -> None:
+        self.all: list[str] = [""]
+
+    def index(self, text: str) -> int:
+        """The text's place in the table; 0 is the empty text, which entries begin with."""
+        if text not in self.all:
+            self.all.append(text)
+        return self.all.index(text)
+
+
+def guess(text: str) -> Const | TextConst:
+    """The value of a literal without a type: true, false, a number, or else a text."""
+    if text.strip() in ("true", "false"):
+        return Const(Fraction(text.strip() == "true"), is_bool=True)
+    try:
+        return Const(Fraction(int(text, 0)) if text.strip().lower()[:2] == "0x" else Fraction(text.strip()))
+    except (ValueError, ZeroDivisionError):
+        return TextConst(text)
+
+
+class Compiler:
+    """Compiles the expressions of one script.
+
+    `used`: the messages it reads; `tested`: those it asks for `.fresh`; `parts`: C flags of multiplexed signals.
+    """
+
+    def __init__(self, scope: Scope, place: Place, bus: Bus, texts: Texts, floats: bool) -> None:
+        self.scope = scope
+        self._place = place
+        self._bus = bus
+        self._texts = texts
+        self._arithmetic = Arithmetic(floats, FAULTS, texts.index)
+        self.used: dict[str, Message] = {}
+        self.tested: set[str] = set()
+        self.parts: set[str] = set()
+
+    # Values
+
+    def evaluate(self, expression: Expression) -> Value:
+        """The expression's value."""
+        if isinstance(expression, Number):
+            return Const(expression.value, expression.is_bool)
+        if isinstance(expression, Text):
+            return TextConst(expression.text)
+        if isinstance(expression, Name):
+            return self.named(expression.name, expression.index)
+        if isinstance(expression, Unary):
+            return self._arithmetic.unary(expression.operator, self.evaluate(expression.operand), expression.index)
+        if isinstance(expression, Binary):
+            return self._binary(expression)
+        if isinstance(expression, Comparison):
+            return self._chain(expression)
+        if isinstance(expression, Conditional):
+            condition = self.truth(expression.condition)
+            yes, no = self.evaluate(expression.yes), self.evaluate(expression.no)
+            return self._arithmetic.choose(condition, yes, no, expression.index)
+        raise ScriptError(expression.index, "an assignment inside an expression", "make it a statement of its own")
+
+    def truth(self, expression: Expression) -> Num | Const:
+        """The expression as a condition."""
+        return self._arithmetic.truth(self.evaluate(expression), expression.index)
+
+    def _binary(self, expression: Binary) -> Value:
+        if expression.operator not in ("&&", "||"):
+            left, right = self.evaluate(expression.left), self.evaluate(expression.right)
+            return self._arithmetic.binary(expression.operator, left, right, expression.index)
+        return self._both(expression.operator, self.truth(expression.left), self.truth(expression.right))
+
+    @staticmethod
+    def _both(sign: str, left: Num | Const, right: Num | Const) -> Num | Const:
+        decides = Fraction(sign == "||")  # a constant that decides, whatever the other side is
+        for one, other in ((left, right), (right, left)):
+            if isinstance(one, Const):
+                return Const(decides, is_bool=True) if one.value == decides else other
+        assert isinstance(left, Num) and isinstance(right, Num)
+        return boolean(f"({left.c} {sign} {right.c})")
+
+    def _chain(self, expression: Comparison) -> Num | Const:
+        values = [self._comparable(part, expression) for part in expression.operands]
+        answer: Num | Const = Const(Fraction(1), is_bool=True)
+        for place, sign in enumerate(expression.operators):
+            index = expression.operands[place + 1].index
+            answer = self._both("&&", answer, self._arithmetic.compare(sign, values[place], values[place + 1], index))
+        return answer
+
+    def _comparable(self, part: Expression, chain: Comparison) -> Value:
+        """A name of a signal's value may stand without quotes beside the signal, as enums do in BehaviorTree.CPP."""
+        if isinstance(part, Name) and "." not in part.name and not self.scope.knows(part.name):
+            for other in chain.operands:
+                if isinstance(other, Name) and "." in other.name:
+                    value = self.named(other.name, other.index)
+                    if isinstance(value, Num) and part.name in value.choices:
+                        return TextConst(part.name)
+        return self.evaluate(part)
+
+    # Names
+
+    def named(self, name: str, index: int) -> Value:
+        """What a name's value is."""
+        return self.target_value(self._resolve(name, index), index)
+
+    def _resolve(self, name: str, index: int) -> Entry | SignalName:
+        try:
+            return self.scope.resolve(name, self._place)
+        except CompileError as error:
+            raise ScriptError(index, error.message, error.help_text) from error
+
+    def entry(self, entry: Entry, index: int) -> Value:
+        """An entry's value."""
+        if entry.is_constant:
+            value = guess(entry.initial or "")
+            return TextConst(entry.initial or "") if entry.type.kind == "text" else value
+        if entry.initial is None and not any(use.writes for use in entry.uses):
+            raise ScriptError(index, f"nothing writes entry '{entry.name}'", self.scope.help_for(entry.name))
+        return self.stored(entry, index)
+
+    def stored(self, entry: Entry, index: int) -> Value:
+        """The value of the entry's member."""
+        c, kind = f"app->entries.{entry.c_name}", entry.type
+        if kind.kind == "any":
+            raise UntypedError(entry.name)
+        if kind.kind == "user":
+            raise ScriptError(index, f"'{entry.name}' is of your type {kind.c}: scripts cannot read it", "write a leaf")
+        if kind.kind == "text":
+            return TextVar(c)
+        if kind.kind == "float":
+            return Double(c if kind.c == "double" else f"(double){c}")
+        if kind.high > INT64[1]:
+            return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1])
+        return Num(c, kind.c, kind.low, kind.high, is_bool=kind.kind == "bool")
+
+    def _message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
+        for message in messages:
+            if message.name == name:
+                return message
+        known = [message.name for message in messages]
+        raise ScriptError(
+            index, f"node '{self._bus.node}' of {self._bus.path.name} does not {verb} '{name}'", nearest(name, known)
+        )
+
+    def signal(self, text: str, index: int) -> Num:
+        """A received signal in physical units, or whether its message is fresh."""
+        message_name, _, signal_name = text.partition(".")
+        message = self._message(message_name, self._bus.receive, "receive", index)
+        member = f"app->input.{message.c_name}"
+        if signal_name == "fresh":
+            self.tested.add(message.name)
+            return Num(f"{member}.fresh", "bool", 0, 1, is_bool=True)
+        signal = self._signal(message, signal_name, index)
+        self.used[message.name] = message
+        if signal in message.multiplexed:
+            self.parts.add(f"{member}.{signal.has_name}")
+        c = f"{member}.{signal.c_name}"
+        if signal.is_bool:
+            return Num(c, "bool", 0, 1, is_bool=True)
+        low, high = signal.limits
+        raw = Num(c, signal.c_type, low, high)
+        if high > INT64[1]:
+            raw = Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1])
+        return self._physical(raw, signal, index)
+
+    def _signal(self, message: Message, name: str, index: int) -> Signal:
+        for signal in message.signals:
+            if signal.name == name and signal.is_float:
+                raise ScriptError(index, f"'{message.name}.{name}' is a float, which scripts cannot use", "use a leaf")
+            if signal.name == name:
+                return signal
+        known = ["fresh", *(signal.name for signal in message.signals)]
+        raise ScriptError(index, f"message '{message.name}' has no signal '{name}'", nearest(name, known))
+
+    def _physical(self, raw: Num, signal: Signal, index: int) -> Num:
+        scale, offset = Fraction(signal.scale), Fraction(signal.offset)
+        step = common_scale(abs(scale), abs(offset))
+        value = self._arithmetic.scaled(Num(raw.c, raw.c_type, raw.low, raw.high, abs(scale)), step, index)
+        if scale < 0:
+            negative = self._arithmetic.unary("-", value, index)
+            assert isinstance(negative, Num)
+            value = negative
+        shift = int(offset / step)
+        if shift:
+            moved = self._arithmetic.binary("+", value, Const(offset), index)
+            assert isinstance(moved, Num)
+            value = moved
+        factor = int(scale / step)
+        names = {text: raw_value * factor + shift for raw_value, text in signal.choices}
+        return Num(value.c, value.c_type, value.low, value.high, value.scale, choices=names)
+
+    def target_value(self, target: Entry | SignalName, index: int) -> Value:
+        """The value of what a name stands for."""
+        return self.signal(target.text, index) if isinstance(target, SignalName) else self.entry(target, index)
+
+    def compare_values(self, sign: str, left: Value, right: Value) -> Num | Const:
+        """A comparison of values that are no expressions: a Switch's cases."""
+        return self._arithmetic.compare(sign, left, right, 0)
+
+    # Storing
+
+    def parameter(self, value: Value, least: int) -> str:
+        """The C expression of a node's parameter: 32 bits, and not below `least`."""
+        if isinstance(value, Num) and value.is_bool:
+            return f"(int32_t){value.c}"
+        return self.convert(value, PortType("int", "int32_t", least, 2**31 - 1), 0)
+
+    def convert(self, value: Value, kind: PortType, index: int) -> str:
+        """The C expression that stores a value in an entry or port of a type."""
+        if kind.kind == "text":
+            if isinstance(value, (TextConst, TextVar)):
+                return self._arithmetic.text(value)
+            raise ScriptError(index, f"{describe(value)} cannot be stored as a text", "write it in '…'")
+        if isinstance(value, (TextConst, TextVar)) or kind.kind == "user":
+            raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
+        if kind.kind == "float":
+            c = self._arithmetic.double(value, index)
+            return c if kind.c == "double" else f"(float)({c})"
+        if kind.kind == "bool":
+            truth = self._arithmetic.truth(value, index)
+            return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
+        if isinstance(value, Double):
+            return f"({kind.c})canopy_whole({value.c}, {_limits(kind)}, {FAULTS})"
+        return self._whole(value, kind, index)
+
+    def _whole(self, value: Num | Const, kind: PortType, index: int) -> str:
+        if isinstance(value, Const):
+            if value.value.denominator != 1:
+                raise ScriptError(index, f"{plain(value.value)} is no whole number, and {kind} is wanted")
+            if not kind.low <= value.value <= kind.high:
+                raise ScriptError(index, f"{plain(value.value)} is outside {kind.c} [{kind.low}, {kind.high}]")
+            bits = kind.c.strip("uint_")
+            sign = "U" if kind.low == 0 else ""
+            whole = int(value.value)
+            if whole == kind.low and whole < 0:
+                return f"(INT{bits}_C({whole + 1}) - 1)"
+            return f"{sign}INT{bits}_C({whole})"
+        if value.scale.denominator != 1:
+            raise ScriptError(
+                index,
+                f"{describe(value)} would lose precision as {kind}",
+                f"multiply it by {value.scale.denominator}, and count in that unit",
+            )
+        whole_value = self._arithmetic.scaled(value, Fraction(1), index)
+        if kind.low <= whole_value.low and whole_value.high <= kind.high:
+            return whole_value.c if whole_value.c_type == kind.c else f"({kind.c}){whole_value.c}"
+        return f"({kind.c})canopy_limit({stripped(whole_value.as_type(True))}, {_limits(kind)}, {FAULTS})"
+
+    def statement(self, expression: Expression) -> list[str]:
+        """C lines of a statement; none for one that only computes."""
+        if not isinstance(expression, Assignment):
+            self.evaluate(expression)
+            return []
+        target = self._resolve(expression.target.name, expression.target.index)
+        if isinstance(target, SignalName):
+            return self._write_signal(target.text, expression)
+        value = self.evaluate(expression.value)
+        if expression.operator not in (":=", "="):
+            value = self._arithmetic.binary(
+                expression.operator[0], self.stored(target, expression.index), value, expression.index
+            )
+        if target.type.kind == "any":
+            raise UntypedError(target.name)
+        return self.store(target, self.convert(value, target.type, expression.value.index))
+
+    @staticmethod
+    def store(target: Entry, c: str) -> list[str]:
+        """C lines that write an entry."""
+        lines = [f"app->entries.{target.c_name} = {stripped(c)};"]
+        if target.counted:
+            lines.append(f"app->entries.{target.c_name}_updates++;")
+        return lines
+
+    def _write_signal(self, text: str, expression: Assignment) -> list[str]:
+        message_name, _, signal_name = text.partition(".")
+        index = expression.target.index
+        message = self._message(message_name, self._bus.send, "send", index)
+        signal = self._signal(message, signal_name, index)
+        if expression.operator not in (":=", "="):
+            raise ScriptError(
+                index, f"'{text}' is an output: it is written, not read", "compute in an entry, then write"
+            )
+        value = self.evaluate(expression.value)
+        setter = f"{self._bus.name}_set_{message.c_name}_{signal.c_name}"
+        c = self._raw(value, message, signal, expression.value.index, text)
+        return [f"{setter}(&app->output, {stripped(c)});"]
+
+    def _raw(self, value: Value, message: Message, signal: Signal, index: int, text: str) -> str:
+        """The C expression of a raw value, of the setter's type."""
+        if signal.choices:
+            names = {name: raw for raw, name in signal.choices}
+            enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}"
+            if isinstance(value, TextConst):
+                if value.text not in names:
+                    raise ScriptError(index, f"'{value.text}' is no value of '{text}'", nearest(value.text, names))
+                return f"{enum}_{snake(value.text)}".upper()
+            if not isinstance(value, (Num, Const)):
+                raise ScriptError(index, f"{describe(value)} is no value of '{text}'")
+            wide = PortType("int", "int32_t", -(2**31), 2**31 - 1)
+            return f"({enum}_t)({self._whole(value, wide, index)})"
+        if signal.is_bool:
+            truth = self._arithmetic.truth(value, index)
+            return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
+        if not isinstance(value, (Num, Const)):
+            raise ScriptError(
+                index,
+                f"{describe(value)} cannot be written to '{text}', which is in fixed point",
+                "compute it in whole numbers",
+            )
+        return self._raw_number(value, signal, index, text)
+
+    def _raw_number(self, value: Num | Const, signal: Signal, index: int, text: str) -> str:
+        scale, offset = Fraction(signal.scale), Fraction(signal.offset)
+        moved = self._arithmetic.binary("-", value, Const(offset), index)
+        raw = self._arithmetic.binary("/", moved, Const(scale), index)
+        if isinstance(raw, Const):
+            if raw.value.denominator != 1:
+                raise ScriptError(
+                    index, f"'{text}' is in steps of {signal.scale}: this value lies between two", "round it"
+                )
+            if not signal.low <= raw.value <= signal.high:
+                ends = sorted((signal.low * scale + offset, signal.high * scale + offset))
+                raise ScriptError(index, f"outside the range of '{text}' [{plain(ends[0])}, {plain(ends[1])}]")
+        assert isinstance(raw, (Num, Const))
+        if isinstance(raw, Num) and raw.scale.denominator != 1:
+            raise ScriptError(
+                index, f"'{text}' is in steps of {signal.scale}: the value would be rounded", "use such steps"
+            )
+        c_type = value_type(signal)
+        low, high = {"int32_t": (-(2**31), 2**31 - 1), "int64_t": INT64, "uint64_t": (0, 2**64 - 1)}[c_type]
+        return self._whole(raw, PortType("int", c_type, low, high), index)
+
+
+def _limits(kind: PortType) -> str:
+    """The limits of a type as C names where it has such."""
+    bits = kind.c.strip("uint_")
+    low = "0" if kind.low == 0 else f"INT{bits}_MIN" if kind.low == -(2 ** (int(bits) - 1)) else number(kind.low, True)
+    if kind.high > INT64[1]:
+        return f"{low}, INT64_MAX"
+    return f"{low}, {'U' if kind.high == 2 ** int(bits) - 1 else ''}INT{bits}_MAX"
+
+
+def stripped(c: str) -> str:
+    """Without the parentheses around the whole."""
+    if not (c.startswith("(") and c.endswith(")")):
+        return c
+    depth = 0
+    for place, character in enumerate(c):
+        depth += {"(": 1, ")": -1}.get(character, 0)
+        if depth == 0 and place != len(c) - 1:
+            return c
+    return c[1:-1]

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: MIT
+"""The grammar of scripts, and its parser.
+
+    script     = [statement {";" statement}] [";"]
+    statement  = [name (":=" | "=" | "+=" | "-=" | "*=" | "/=")] conditional
+    conditional = logical ["?" conditional ":" conditional]
+    logical    = comparison {"&&" comparison} | comparison {"||" comparison}
+    comparison = operand {("==" | "!=" | "<" | "<=" | ">" | ">=") operand}
+    operand    = math | bits
+    math       = product {("+" | "-" | "..") product}        product = prefix {("*" | "/") prefix}
+    bits       = bit_and {("|" | "^") bit_and}               bit_and = prefix {"&" prefix}
+    prefix     = {"-" | "!" | "~"} atom
+    atom       = number | 'text' | true | false | name | "(" conditional ")"
+
+BehaviorTree.CPP gives && and || the same precedence, which no reader expects: mixing them needs parentheses here. As
+there, mixing + - * / with & | ^ needs parentheses.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+MAX_NESTING = 100
+
+ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
+COMPARISONS = ("==", "!=", "<=", ">=", "<", ">")
+MATH = ("+", "-", "..", "*", "/")
+BITS = ("&", "|", "^")
+
+_TOKEN = re.compile(
+    r"""\s*(?:
+      (?P<number>0[xX][0-9A-Fa-f]+|\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)
+    | (?P<text>'[^']*')
+    | (?P<name>@?[^\W\d]\w*(?:\.[^\W\d]\w*)*)
+    | (?P<operator>:=|==|!=|<=|>=|\+=|-=|\*=|/=|&&|\|\||\.\.|[-+*/&|^~!<>?:;()=])
+    )""",
+    re.VERBOSE,
+)
+_END = re.compile(r"\s*\Z")
+
+
+class ScriptError(Exception):
+    """What is wrong in a script, at a character of its text."""
+
+    def __init__(self, index: int, message: str, help_text: str = "") -> None:
+        super().__init__(message)
+        self.index = index
+        self.message = message
+        self.help_text = help_text
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A part of a script; `index` is its character in the text."""
+
+    index: int
+
+
+@dataclass(frozen=True)
+class Number(Expression):
+    """A number, exactly as written. `is_bool`: it was written true or false."""
+
+    value: Fraction
+    is_bool: bool = False
+
+
+@dataclass(frozen=True)
+class Text(Expression):
+    """'…'."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Name(Expression):
+    """An entry or a signal."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Unary(Expression):
+    """-x, !x, ~x."""
+
+    operator: str
+    operand: Expression
+
+
+@dataclass(frozen=True)
+class Binary(Expression):
+    """Arithmetic, bits, && and ||."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True)
+class Comparison(Expression):
+    """A chain: `a < b <= c` is `a < b && b <= c`."""
+
+    operands: tuple[Expression, ...]
+    operators: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Conditional(Expression):
+    """condition ? yes : no."""
+
+    condition: Expression
+    yes: Expression
+    no: Expression
+
+
+@dataclass(frozen=True)
+class Assignment(Expression):
+    """A statement that writes."""
+
+    operator: str
+    target: Name
+    value: Expression
+
+
+@dataclass(frozen=True)
+class _Token:
+    kind: str
+    text: str
+    index: int
+
+
+def _tokens(text: str) -> list[_Token]:
+    tokens = []
+    position = 0
+    while not _END.match(text, position):
+        match = _TOKEN.match(text, position)
+        if match is None:
+            index = position + len(text[position:]) - len(text[position:].lstrip())
+            if text[index] == "'":
+                raise ScriptError(index, "a text without its closing '")
+            raise ScriptError(index, f"'{text[index]}' has no meaning in a script")
+        kind = match.lastgroup or ""
+        word = match[kind]
+        index = match.start(kind)
+        if kind == "number" and re.match(r"\w", text[match.end() : match.end() + 1]):
+            raise ScriptError(index, f"'{word}{text[match.end()]}…' is neither a number nor a name")
+        tokens.append(_Token(kind, word, index))
+        position = match.end()
+    tokens.append(_Token("end", "", len(text)))
+    return tokens
+
+
+class _Parser:
+    def __init__(self, text: str) -> None:
+        self._tokens = _tokens(text)
+        self._next = 0
+        self._nesting = 0
+
+    def _peek(self) -> _Token:
+        return self._tokens[self._next]
+
+    def _is(self, *operators: str) -> bool:
+        token = self._peek()
+        return token.kind == "operator" and token.text in operators
+
+    def _take(self) -> _Token:
+        token = self._peek()
+        self._next += 1
+        return token
+
+    def _expect(self, operator: str, what: str) -> None:
+        if not self._is(operator):
+            raise ScriptError(self._peek().index, f"'{operator}' is missing {what}")
+        self._take()
+
+    def script(self) -> tuple[Expression, ...]:
+        statements = []
+        while self._peek().kind != "end":
+            if self._is(";"):
+                self._take()
+                continue
+            statements.append(self._statement())
+            if self._peek().kind != "end" and not self._is(";"):
+                token = self._peek()
+                raise ScriptError(
+                    token.index, f"'{token.text}' does not belong here", "statements are separated by ';'"
+                )
+        if not statements:
+            raise ScriptError(0, "the script is empty")
+        return tuple(statements)
+
+    def _statement(self) -> Expression:
+        first = self._peek()
+        value = self._conditional()
+        if not self._is(*ASSIGNMENTS):
+            return value
+        operator = self._take()
+        if not isinstance(value, Name):
+            raise ScriptError(first.index, f"the left side of '{operator.text}' must be a name", "to compare, write ==")
+        return Assignment(first.index, operator.text, value, self._conditional())
+
+    def _conditional(self) -> Expression:
+        self._nesting += 1
+        if self._nesting > MAX_NESTING:
+            raise ScriptError(self._peek().index, f"nested more than {MAX_NESTING} deep")
+        condition = self._logical()
+        if self._is("?"):
+            index = self._take().index
+            yes = self._conditional()
+            self._expect(":", "after '?'")
+            condition = Conditional(index, condition, yes, self._conditional())
+        self._nesting -= 1
+        return condition
+
+    def _logical(self) -> Expression:
+        left = self._comparison()
+        if not self._is("&&", "||"):
+            return left
+        operator = self._peek().text
+        while self._is("&&", "||"):
+            token = self._take()
+            if token.text != operator:
+                raise ScriptError(
+                    token.index,
+                    "&& and || in one row",
+                    "use parentheses: BehaviorTree.CPP reads such a row from left to right, most people do not",
+                )
+            left = Binary(token.index, operator, left, self._comparison())
+        return left
+
+    def _comparison(self) -> Expression:
+        operands = [self._operand()]
+        operators = []
+        while self._is(*COMPARISONS):
+            operators.append(self._take().text)
+            operands.append(self._operand())
+        if not operators:
+            return operands[0]
+        return Comparison(operands[0].index, tuple(operands), tuple(operators))
+
+    def _operand(self) -> Expression:
+        first = self._prefix()
+        others: tuple[str, ...]
+        if self._is(*MATH):
+            result, others = self._row(self._row_of_products, ("+", "-", ".."), first), BITS
+        elif self._is(*BITS):
+            result, others = self._row(self._row_of_ands, ("|", "^"), first), MATH
+        else:
+            return first
+        if self._is(*others):
+            raise ScriptError(
+                self._peek().index, "+ - * / and & | ^ in one row", "use parentheses to say what is computed first"
+            )
+        return result
+
+    def _row(
+        self, part: Callable[[Expression | None], Expression], operators: tuple[str, ...], first: Expression | None
+    ) -> Expression:
+        left = part(first)
+        while self._is(*operators):
+            token = self._take()
+            left = Binary(token.index, token.text, left, part(None))
+        return left
+
+    def _row_of_products(self, first: Expression | None) -> Expression:
+        return self._row(lambda known: known or self._prefix(), ("*", "/"), first)
+
+    def _row_of_ands(self, first: Expression | None) -> Expression:
+        return self._row(lambda known: known or self._prefix(), ("&",), first)
+
+    def _prefix(self) -> Expression:
+        operators = []
+        while self._is("-", "!", "~"):
+            operators.append(self._take())
+            if len(operators) > MAX_NESTING:
+                raise ScriptError(operators[-1].index, f"nested more than {MAX_NESTING} deep")
+        value = self._atom()
+        for token in reversed(operators):
+            value = Unary(token.index, token.text, value)
+        return value
+
+    def _atom(self) -> Expression:
+        token = self._take()
+        if token.kind == "number":
+            is_hex = token.text[:2].lower() == "0x"
+            return Number(token.index, Fraction(int(token.text, 16)) if is_hex else Fraction(token.text))
+        if token.kind == "text":
+            return Text(token.index, token.text[1:-1])
+        if token.kind == "name":
+            if token.text in ("true", "false"):
+                return Number(token.index, Fraction(token.text == "true"), is_bool=True)
+            return Name(token.index, token.text)
+        if token.text == "(":
+            inner = self._conditional()
+            if self._is(*ASSIGNMENTS):
+                raise ScriptError(
+                    self._peek().index, "an assignment inside an expression", "make it a statement of its own"
+                )
+            self._expect(")", f"for the '(' at character {token.index + 1}")
+            return inner
+        what = f"'{token.text}'" if token.text else "the end of the script"
+        raise ScriptError(token.index, f"a value is expected here, not {what}")
+
+
+def parse(text: str) -> tuple[Expression, ...]:
+    """The statements of a script, at least one.
+
+    Raises:
+        ScriptError: it is not in the grammar.
+    """
+    return _Parser(text).script()
+
+
+def parts(expression: Expression) -> list[Expression]:
+    """The expression and all its parts."""
+    found: list[Expression] = []
+    waiting = [expression]
+    while waiting:
+        part = waiting.pop()
+        found.append(part)
+        if isinstance(part, Unary):
+            waiting.append(part.operand)
+        elif isinstance(part, Binary):
+            waiting += [part.left, part.right]
+        elif isinstance(part, Comparison):
+            waiting += part.operands
+        elif isinstance(part, Conditional):
+            waiting += [part.condition, part.yes, part.no]
+        elif isinstance(part, Assignment):
+            waiting += [part.target, part.value]
+    return found

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""The bodies of the C functions that scripts become, by what the script is for (tree.Role)."""
+
+from __future__ import annotations
+
+from canopy.compiler.blackboard import Entry, SignalName, pointer
+from canopy.compiler.bus_reader import Bus
+from canopy.compiler.port_types import TEXT, literal
+from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess, stripped
+from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
+from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
+from canopy.compiler.tree import Script
+
+
+def entry_value(script: Script) -> Entry | SignalName | str:
+    """What SetBlackboard's value is: an entry or a signal in braces, or a literal."""
+    name = pointer(script.text, "value")
+    return script.text if name is None else script.scope.resolve(name, script.place())
+
+
+class Bodies:
+    """Compiles scripts. `indices`: the place of each node (by its id()) in the node table."""
+
+    def __init__(self, bus: Bus, texts: Texts, floats: bool, indices: dict[int, int]) -> None:
+        self._bus = bus
+        self._texts = texts
+        self._floats = floats
+        self._indices = indices
+
+    def body(self, script: Script, statements: tuple[Expression, ...]) -> tuple[str, ...]:
+        """The lines of the function, without its head."""
+        compiler = Compiler(script.scope, script.place(), self._bus, self._texts, self._floats)
+        if script.role in ("condition", "action"):
+            lines = self._statements(compiler, script, statements)
+        elif script.role == "switch":
+            lines = self._switch(compiler, script)
+        elif script.role == "updates":
+            assert isinstance(script.target, Entry)
+            lines = [f"return (int32_t)app->entries.{script.target.c_name}_updates;"]
+        elif script.role == "take":
+            lines = self._take(compiler, script)
+        elif script.role == "parameter":
+            lines = self._parameter(compiler, script)
+        else:
+            lines = self._set(compiler, script)
+        return (*self._guard(compiler), *lines)
+
+    @staticmethod
+    def _guard(compiler: Compiler) -> list[str]:
+        """A script that reads a stale signal is not run, unless it asks for .fresh itself."""
+        stale = [message for name, message in compiler.used.items() if name not in compiler.tested]
+        flags = sorted(f"app->input.{message.c_name}.fresh" for message in stale)
+        flags += sorted(compiler.parts)
+        if not flags:
+            return []
+        tests = " || ".join(f"!{flag}" for flag in flags)
+        return [f"if ({tests}) {{", "    return 0;", "}"]
+
+    def _statements(self, compiler: Compiler, script: Script, statements: tuple[Expression, ...]) -> list[str]:
+        lines = [line for statement in statements[:-1] for line in compiler.statement(statement)]
+        last = statements[-1]
+        if script.role == "action":
+            return [*lines, *compiler.statement(last), "return 1;"]
+        if isinstance(last, Assignment):
+            lines += compiler.statement(last)
+            last = last.target
+        truth = compiler.truth(last)
+        return [*lines, f"return {int(truth.value)};" if isinstance(truth, Const) else f"return {stripped(truth.c)};"]
+
+    def _value(self, compiler: Compiler, script: Script, text: str, own_name: str) -> Value:
+        name = pointer(text, own_name)
+        return guess(text) if name is None else compiler.named(name, 0)
+
+    def _switch(self, compiler: Compiler, script: Script) -> list[str]:
+        value = self._value(compiler, script, script.text, "variable")
+        cases = [name for name in script.element.attributes if name.startswith("case_")]
+        lines: list[str] = []
+        for place, attribute in enumerate(sorted(cases)):
+            text = script.element.attributes[attribute]
+            case = self._value(compiler, script, text, attribute)
+            if isinstance(value, TextVar) or (isinstance(value, Num) and value.choices and isinstance(case, TextConst)):
+                case = TextConst(text) if pointer(text, attribute) is None else case
+            answer = compiler.compare_values("==", value, case)
+            if isinstance(answer, Const):
+                if answer.value:
+                    return [*lines, f"return {place};"]
+                continue
+            lines += [f"if {answer.c if answer.c.startswith('(') else f'({answer.c})'} {{", f"    return {place};", "}"]
+        return [*lines, f"return {len(cases)};"]
+
+    def _take(self, compiler: Compiler, script: Script) -> list[str]:
+        assert isinstance(script.target, Entry)
+        assert script.type is not None
+        if script.queue is not None:
+            return self._take_from_entry(compiler, script, script.queue, script.target)
+        assert script.state is not None
+        place = script.place()
+        texts = [text.strip() for text in script.text.split(";") if text.strip()]
+        if not texts:
+            raise ScriptError(0, "the list is empty", 'for example queue="1;2;3"')
+        if script.type == TEXT:
+            items, c_type = [f"{self._texts.index(text)}u" for text in texts], "uint16_t"
+        else:
+            items = [literal(text, script.type, "queue", place) for text in texts]
+            c_type = script.type.c
+        state = f"app->entries.{script.state.c_name}"
+        return [
+            f"static const {c_type} items[] = {{{', '.join(items)}}};",
+            "",
+            f"if (app->status[{self._indices[id(script.node)]}] != (uint8_t)CANOPY_RUNNING) {{",
+            f"    {state} = 0;",
+            "}",
+            f"if ({state} == {len(items)}u) {{",
+            "    return 0;",
+            "}",
+            *compiler.store(script.target, f"items[{state}]"),
+            f"{state}++;",
+            "return 1;",
+        ]
+
+    @staticmethod
+    def _take_from_entry(compiler: Compiler, script: Script, queue: Entry, target: Entry) -> list[str]:
+        assert script.type is not None
+        kind = queue.type
+        if kind.item != script.type.c:
+            raise ScriptError(
+                0,
+                f"entry '{queue.name}' is {kind}, and a queue of {script.type.c} is needed",
+                f"declare the port that fills it as type='{script.type.c}[8]'",
+            )
+        member = f"app->entries.{queue.c_name}"
+        return [
+            f"if ({member}.count == 0u) {{",
+            "    return 0;",
+            "}",
+            f"if ({member}.count > {kind.capacity}u) {{",
+            f"    canopy_script_fault({FAULTS});",
+            f"    {member}.count = {kind.capacity}u;",
+            "}",
+            *compiler.store(target, f"{member}.items[0]"),
+            f"{member}.count--;",
+            f"memmove(&{member}.items[0], &{member}.items[1], {member}.count * sizeof {member}.items[0]);",
+            "return 1;",
+        ]
+
+    def _set(self, compiler: Compiler, script: Script) -> list[str]:
+        target = script.target
+        assert isinstance(target, Entry)
+        if script.role == "unset":
+            return [*initial_lines(target, self._texts), "return 1;"]
+        source = entry_value(script)
+        if isinstance(source, Entry) and source.type.kind == "user" and source.type == target.type:
+            return [*compiler.store(target, f"app->entries.{source.c_name}"), "return 1;"]
+        if isinstance(source, str) and target.type.kind in ("user", "float"):
+            c = literal(source, target.type, "value", script.place())
+        elif isinstance(source, str) and target.type == TEXT:
+            c = compiler.convert(TextConst(source), TEXT, 0)
+        else:
+            value = guess(source) if isinstance(source, str) else compiler.target_value(source, 0)
+            c = compiler.convert(value, target.type, 0)
+        return [*compiler.store(target, c), "return 1;"]
+
+    def _parameter(self, compiler: Compiler, script: Script) -> list[str]:
+        assert script.target is not None
+        value = compiler.target_value(script.target, 0)
+        return [f"return {stripped(compiler.parameter(value, script.least))};"]
+
+
+def initial_lines(entry: Entry, texts: Texts) -> list[str]:
+    """C lines that give an entry the value it begins with: the literal of its SubTree, else 0."""
+    member = f"app->entries.{entry.c_name}"
+    if entry.initial is not None and entry.type == TEXT:
+        return [f"{member} = {texts.index(entry.initial)}u;"]
+    if entry.initial is not None:
+        return [f"{member} = {literal(entry.initial, entry.type, f'entry {entry.name!r}', entry.place)};"]
+    if entry.type.kind == "user":
+        return [f"memset(&{member}, 0, sizeof {member});"]
+    return [f"{member} = {'false' if entry.type.kind == 'bool' else '0'};"]

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""`canopy compile --stubs FILE.c`: a skeleton of every function that the user has to write."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from canopy.compiler.bus_reader import Bus
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.leaf_c import prototypes
+from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.table import Table
+
+HEAD = """\
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * The nodes of application {name}, as skeletons to fill in: each one fails until then. Made once by
+ * `canopy compile --stubs`, and yours from now on.
+ */
+#include "{name}_leaves.h"
+"""
+
+
+def _body(leaf: Leaf, prototype: str) -> list[str]:
+    """Statements that compile without a warning and do the least."""
+    arguments = prototype[prototype.index("(") + 1 : -1].split(", ")
+    names = [match[1] for part in arguments if (match := re.search(r"(\w+)$", part))]
+    function = prototype.split("(")[0].rsplit("_", 1)[1]
+    used: tuple[str, ...] = ()
+    last: list[str] = []
+    if leaf.is_inner and function == "enter":
+        used, last = ("node",), ["return node + 1u; /* the first child */"]
+    elif leaf.is_inner and function == "child":
+        used = ("tree", "child", "status")
+        last = [
+            "if (status != CANOPY_RUNNING) {",
+            "    canopy_reset_child(tree, child);",
+            "}",
+            "return canopy_done(status);",
+        ]
+    elif not prototype.startswith("void"):
+        last = ["return CANOPY_FAILURE;"]
+    return [*(f"(void){name};" for name in names if name not in used), *last]
+
+
+def _function(leaf: Leaf, prototype: str) -> str:
+    lines = "\n".join(f"    {line}" for line in _body(leaf, prototype))
+    return f"{prototype}\n{{\n{lines}\n}}\n"
+
+
+def stubs(name: str, table: Table, bus: Bus) -> str:
+    """The C file: every function once, in the order of <application>_leaves.h."""
+    parts = [HEAD.format(name=name)]
+    for use in table.users:
+        leaf = use.leaf
+        parts.append(f"/* {leaf.id} ({leaf.kind}), declared at {Path(leaf.place.file).name}:{leaf.place.line} */\n")
+        parts += [_function(leaf, prototype) for prototype in prototypes(leaf, bus)]
+    return "\n".join(parts)
+
+
+def write_stubs(path: Path, text: str) -> None:
+    """Writes a new file.
+
+    Raises:
+        CompileError: the file is there already; it is never overwritten.
+        OSError: it cannot be written.
+    """
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise CompileError(
+            Place(str(path)), "is there already, and is not overwritten", "name a new file, and copy what is missing"
+        ) from None

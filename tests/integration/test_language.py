@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""The tree language through `canopy compile`: subtrees and includes, entries, scripts, and what is refused by name."""
+
+# ruff: noqa: E501
+# In the tables, one line is one case.
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+
+from canopy.compiler.script.syntax import parse
+from integration.language import MODEL, compile_files, tree
+
+
+def expect(tmp_path: Path, result: Result, place: str, *texts: str) -> None:
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith(f"{tmp_path / place}: error: "), result.stderr
+    for text in texts:
+        assert text in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_model_file_knows_each_nodes_path(tmp_path: Path) -> None:
+    more = '<BehaviorTree ID="Dock"><Sequence name="Dock"><AlwaysSuccess/><AlwaysSuccess/></Sequence></BehaviorTree>'
+    nodes = '<Sequence><SubTree ID="Dock"/><SubTree ID="Dock"/><SubTree ID="Dock" name="last"/></Sequence>'
+    assert compile_files(tmp_path, {"main.xml": tree(nodes, more)}).exit_code == 0
+    model = json.loads((tmp_path / "out" / "main.model.json").read_text())
+    assert [node["path"] for node in model["tree"]["nodes"]] == [
+        "Main/Sequence",
+        *(
+            f"Main/{name}/{node}"
+            for name in ("Dock", "Dock::2", "last")
+            for node in ("Dock", "AlwaysSuccess", "AlwaysSuccess::2")
+        ),
+    ]
+
+
+def test_a_subtree_costs_no_node_and_its_attributes_one(tmp_path: Path) -> None:
+    more = '<BehaviorTree ID="A"><SubTree ID="B" _skipIf="false"/></BehaviorTree><BehaviorTree ID="B"><AlwaysSuccess/></BehaviorTree>'
+    assert compile_files(tmp_path, {"main.xml": tree('<SubTree ID="A"/>', more)}).exit_code == 0
+    model = json.loads((tmp_path / "out" / "main.model.json").read_text())
+    assert [node["type"] for node in model["tree"]["nodes"]] == ["Attributes", "AlwaysSuccess"]
+
+
+INNER = '<root BTCPP_format="4"><BehaviorTree ID="Inner"><AlwaysSuccess/></BehaviorTree>{}</root>'
+
+
+def test_each_file_is_included_once_and_named_in_the_model(tmp_path: Path) -> None:
+    files = {
+        "main.xml": tree('<SubTree ID="Inner"/>').replace(
+            "<BehaviorTree", '<include path="a/b.xml"/><include path="a/c.xml"/><BehaviorTree', 1
+        ),
+        "a/b.xml": '<root BTCPP_format="4"><include path="../a/c.xml"/></root>',
+        "a/c.xml": INNER.format(f"<TreeNodesModel>{MODEL}</TreeNodesModel>"),
+    }
+    result = compile_files(tmp_path, files, "--depfile", str(tmp_path / "main.d"))
+    assert result.exit_code == 0, result.output
+    model = json.loads((tmp_path / "out" / "main.model.json").read_text())
+    assert model["tree"]["nodes"][0]["file"] == "c.xml"
+    assert all(name in (tmp_path / "main.d").read_text() for name in ("main.xml", "b.xml", "c.xml", "language.dbc"))
+
+
+@pytest.mark.parametrize(
+    ("files", "place", "texts"),
+    [
+        ({"a.xml": INNER.format('<include path="main.xml"/>')}, "a.xml:1:", ["in a loop: main.xml -> a.xml -> main.xml"]),
+        ({"a.xml": INNER.format('<include path="a.xml"/>')}, "a.xml:1:", ["in a loop"]),
+        ({"a.xml": INNER.format('<include ros_pkg="x" path="y"/>')}, "a.xml:1:", ["ros_pkg=…> is not supported"]),
+        ({"a.xml": INNER.format("<include/>")}, "a.xml:1:", ["needs the attribute path"]),
+        ({"a.xml": INNER.format('<BehaviorTree ID="Main"><AlwaysSuccess/></BehaviorTree>')}, "main.xml:2:", ["not 'Main'", "the other one:"]),
+        ({"a.xml": INNER.format('<TreeNodesModel><Action ID="Go"/></TreeNodesModel>')}, "main.xml:6:", ["'Go' is declared again"]),
+        ({}, "main.xml:1:", ["a.xml' is not there", "relative to this file"]),
+    ],
+)  # fmt: skip
+def test_wrong_includes_are_named(tmp_path: Path, files: dict[str, str], place: str, texts: list[str]) -> None:
+    text = tree("<AlwaysSuccess/>").replace("\n<BehaviorTree", '<include path="a.xml"/>\n<BehaviorTree', 1)
+    result = compile_files(tmp_path, {"main.xml": text, **files})
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith(str(tmp_path / place)), result.stderr
+    for part in texts:
+        assert part in result.stderr
+
+
+SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
+
+
+@pytest.mark.parametrize(
+    ("nodes", "more", "place", "texts"),
+    [
+        ("<SubTree ID='Sup'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:14", ["names no tree: 'Sup'", "did you mean 'Sub'?"]),
+        ("<SubTree ID='Sub'/>", SUBTREE.format("<SubTree ID='Main'/>"), "5:24", ["in a cycle: Main -> Sub -> Main"]),
+        ("<Sub/>", SUBTREE.format("<AlwaysSuccess/>"), "3:1", ["unknown node 'Sub'", '<SubTree ID="Sub"/>']),
+        ("<SubTree ID='Sub'><Go/></SubTree>", SUBTREE.format("<AlwaysSuccess/>"), "3:19", ["cannot have children"]),
+        ("<SubTree ID='Sub' _autoremap='maybe'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:31", ["neither true nor false"]),
+        ("<SubTree ID='Sub' _x='1'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:23", ["has no attribute '_x'"]),
+        ("<Sequence><Find goal='{x}'/><Go speed='{x}'/></Sequence>", "", "3:40",
+         ["port 'speed' of 'Go' is int32_t, but entry 'x' is int16_t", "the other end is port 'goal' of 'Find'", "3:23"]),
+        ("<Go speed='{x}'/>", "", "3:12", ["nothing writes entry 'x'", "ports of the main tree"]),
+        ("<Find goal='5'/>", "", "3:13", ["'5' is a literal", "give an entry: {name}"]),
+        ("<Go speed='{a b}'/>", "", "3:12", ["'a b' is not the name of an entry"]),
+        ("<Say text='{t}'/>", "", "3:12", ["nothing writes entry 't'"]),
+        ("<Sequence><Script code='t := 5'/><Say text='{t}'/></Sequence>", "", "3:30", ["the number 5 cannot be stored as a text"]),
+        ("<Go speed='{Climate.Temperature}'/>", "", "3:12", ["port 'speed' of 'Go': a number in steps of 0.5 would lose precision"]),
+        ("<Go speed='{Climat.Temperature}'/>", "", "3:12", ["does not receive 'Climat'", "did you mean 'Climate'?"]),
+        ("<Go speed='{Climate.Temprature}'/>", "", "3:12", ["has no signal 'Temprature'", "did you mean 'Temperature'?"]),
+        ("<Go><Go speed='1'/></Go>", "", "3:1", ["needs a value for its port 'speed'"]),
+        ("<Pick/>", "", "3:1", ["<Pick> needs at least 1 child"]),
+        ("<Guard><AlwaysSuccess/><AlwaysSuccess/></Guard>", "", "3:1", ["<Guard> needs exactly 1 child"]),
+        ("<Control ID='Guard'><AlwaysSuccess/></Control>", "", "3:1", ["'Guard' is declared as Decorator"]),
+        ("<Action/>", "", "3:1", ["<Action> needs the attribute ID"]),
+        ("<TestNode/>", "", "3:1", ["<TestNode> is not supported"]),
+        ("<Repeat num_cycles='{n}'><AlwaysSuccess/></Repeat>", "", "3:21", ["nothing writes entry 'n'"]),
+        ("<Switch2 variable='{x}' case_1='1'><AlwaysSuccess/></Switch2>", "", "3:1", ["needs the attribute case_2"]),
+        ("<Switch2 variable='1' case_1='1' case_2='2'><AlwaysSuccess/></Switch2>", "", "3:1", ["needs exactly 3 child nodes"]),
+        ("<LoopInt queue='{q}' value='{v}'><AlwaysSuccess/></LoopInt>", "", "3:17", ["nothing writes entry 'q'"]),
+        ("<Sequence><Find goal='{q}'/><LoopInt queue='{q}' value='{v}'><AlwaysSuccess/></LoopInt></Sequence>", "", "3:45",
+         ["entry 'q' is int16_t, and a queue of int32_t is needed", "type='int32_t[8]'"]),
+        ("<LoopInt queue='1;x' value='{v}'><AlwaysSuccess/></LoopInt>", "", "3:17", ["'x' is not a whole number"]),
+        ("<LoopDouble queue='1' value='{v}'><AlwaysSuccess/></LoopDouble>", "", "3:1", ["--allow-floating-point"]),
+        ("<Precondition if='1' else='MAYBE'><AlwaysSuccess/></Precondition>", "", "3:28", ["else='MAYBE' is no status"]),
+        ("<SkipUnlessUpdated entry='{Climate.Door}'><AlwaysSuccess/></SkipUnlessUpdated>", "", "3:27", ["is a signal"]),
+    ],
+)  # fmt: skip
+def test_wrong_subtrees_and_ports_are_named(
+    tmp_path: Path, nodes: str, more: str, place: str, texts: list[str]
+) -> None:
+    expect(tmp_path, compile_files(tmp_path, {"main.xml": tree(nodes, more)}), f"main.xml:{place}", *texts)
+
+
+@pytest.mark.parametrize(
+    ("script", "index", "texts"),
+    [
+        ("", 0, ["needs the attribute code"]),
+        ("x :=", 4, ["a value is expected here, not the end"]),
+        ("x := (1", 7, ["')' is missing"]),
+        ("1 +* 2", 3, ["a value is expected here, not '*'"]),
+        ("x := 1 x := 2", 7, ["'x' does not belong here", "separated by ';'"]),
+        ("5 := x", 0, ["the left side of ':=' must be a name"]),
+        ("x := (y := 3)", 8, ["an assignment inside an expression"]),
+        ("x := 'abc", 5, ["a text without its closing '"]),
+        ("x := 12abc", 5, ["is neither a number nor a name"]),
+        ("x := $", 5, ["'$' has no meaning in a script"]),
+        ("1 || 0 && 1", 7, ["&& and || in one row", "use parentheses"]),
+        ("1 + 2 & 3", 6, ["+ - * / and & | ^ in one row"]),
+        ("x := 1 ? 2", 10, ["':' is missing after '?'"]),
+        ("x = 1", 0, ["'=' needs an entry that is there", "write x := "]),
+        ("x += 1", 0, ["'+=' needs an entry that is there"]),
+        ("y > 1", 0, ["nothing writes entry 'y'"]),
+        ("total := 1; totl > 1", 12, ["nothing writes entry 'totl'", "did you mean 'total'?"]),
+        ("x := 0.5", 0, ["entry 'x' would hold fractions", "--allow-floating-point"]),
+        ("x := 1; y := 6 / x", 15, ["a division by what is no constant would be rounded"]),
+        ("x := 1 / 0", 7, ["a division by 0"]),
+        ("x := 'a'; x := 1", 10, ["is written as int32_t here, and as a constant text elsewhere"]),
+        ("x := 'a'; y := x + 1", 17, ["'+' needs numbers, and one side is a text"]),
+        ("x := 'a'; x < 'b'", 14, ["texts have no order"]),
+        ("x := 'a' ; y := x .. 'b'", 18, ["only constant texts can be joined"]),
+        ("x := 1.5 & 1", 9, ["'&' needs whole numbers, not the number 1.5"]),
+        ("Climate.Temperature == 10.3", 23, ["can never be equal: 10.3 is no multiple of the step 0.5"]),
+        ("Climate.Door == 'Opn'", 16, ["'Opn' is no value of this signal", "did you mean 'Open'?"]),
+        ("Climate.Temprature > 1", 0, ["has no signal 'Temprature'", "did you mean 'Temperature'?"]),
+        ("Climate.Door := 1", 0, ["does not send 'Climate'"]),
+        ("Fan.Speed > 3", 0, ["does not receive 'Fan'"]),
+        ("Fan.Speed += 3", 0, ["is an output: it is written, not read"]),
+        ("Fan.Speed := 9000", 13, ["outside the range of 'Fan.Speed' [0, 8000]"]),
+        ("Fan.Speed := 15", 13, ["is in steps of 10: this value lies between two"]),
+        ("Fan.Mode := 'Ful'", 12, ["'Ful' is no value of 'Fan.Mode'", "did you mean 'Full'?"]),
+        ("x := 99999999999999999999", 5, ["is outside int64_t"]),
+        ("(" * 150 + "1", 100, ["nested more than 100 deep"]),
+    ],
+)
+def test_wrong_scripts_are_named_with_the_character(tmp_path: Path, script: str, index: int, texts: list[str]) -> None:
+    text = script.replace("&", "&amp;").replace("<", "&lt;")
+    result = compile_files(tmp_path, {"main.xml": tree(f'<Script code="{text}"/>')})
+    column = 1 if not script else 15 + len(script[:index].replace("&", "&amp;").replace("<", "&lt;"))
+    expect(tmp_path, result, f"main.xml:3:{column}", *texts)
+
+
+@pytest.mark.parametrize(
+    ("script", "shape"),
+    [
+        ("a + b * c", "Binary(+,Name,Binary(*,Name,Name))"),
+        ("a - b - c", "Binary(-,Binary(-,Name,Name),Name)"),
+        ("-a * b", "Binary(*,Unary(-,Name),Name)"),
+        ("a | b & c ^ d", "Binary(^,Binary(|,Name,Binary(&,Name,Name)),Name)"),
+        ("a < b <= c", "Comparison(<,<=)"),
+        ("!a == b", "Comparison(==)"),
+        ("a && b && c", "Binary(&&,Binary(&&,Name,Name),Name)"),
+        ("a ? b : c ? d : e", "Conditional(Name,Name,Conditional(Name,Name,Name))"),
+        ("x := a == b ? 1 : 2", "Assignment(:=,Conditional(Comparison(==),Number,Number))"),
+        ("x += 0x1F", "Assignment(+=,Number)"),
+        ("'a' .. 'b'", "Binary(..,Text,Text)"),
+        ("@root == Battery.Level", "Comparison(==)"),
+        (";; a ;", "Name"),
+    ],
+)
+def test_the_grammar(script: str, shape: str) -> None:
+    def draw(part: object) -> str:
+        kind = type(part).__name__
+        if kind == "Binary":
+            return f"Binary({part.operator},{draw(part.left)},{draw(part.right)})"  # type: ignore[attr-defined]
+        if kind == "Unary":
+            return f"Unary({part.operator},{draw(part.operand)})"  # type: ignore[attr-defined]
+        if kind == "Comparison":
+            return f"Comparison({','.join(part.operators)})"  # type: ignore[attr-defined]
+        if kind == "Conditional":
+            return f"Conditional({draw(part.condition)},{draw(part.yes)},{draw(part.no)})"  # type: ignore[attr-defined]
+        if kind == "Assignment":
+            return f"Assignment({part.operator},{draw(part.value)})"  # type: ignore[attr-defined]
+        return kind
+
+    assert draw(parse(script)[0]) == shape
