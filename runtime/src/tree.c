@@ -126,10 +126,10 @@ static CANOPY_SELDOM canopy_step_t enter(canopy_tree_instance_t *self, canopy_in
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_enter(self, node);
-    case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-    case CANOPY_NODE_REACTIVE_FALLBACK:
+    case CANOPY_NODE_SEQUENCE:          /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_FALLBACK:          /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_REACTIVE_SEQUENCE: /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_REACTIVE_FALLBACK: /* not covered: the tick calls nodes/sequence.h itself */
     case CANOPY_NODE_TYPES:
         break;
     }
@@ -191,10 +191,10 @@ static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, cano
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         return canopy_user_child(self, node, child, status);
-    case CANOPY_NODE_SEQUENCE:
-    case CANOPY_NODE_FALLBACK:
-    case CANOPY_NODE_REACTIVE_SEQUENCE:
-    case CANOPY_NODE_REACTIVE_FALLBACK:
+    case CANOPY_NODE_SEQUENCE:          /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_FALLBACK:          /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_REACTIVE_SEQUENCE: /* not covered: the tick calls nodes/sequence.h itself */
+    case CANOPY_NODE_REACTIVE_FALLBACK: /* not covered: the tick calls nodes/sequence.h itself */
     case CANOPY_NODE_CONDITION:
     case CANOPY_NODE_SYNC_ACTION:
     case CANOPY_NODE_STATEFUL_ACTION:
