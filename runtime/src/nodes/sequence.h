@@ -24,13 +24,21 @@
 /** Index of a node, or a canopy_step_t, in a register's width: cutting it down costs an instruction each time. */
 typedef uint_fast32_t canopy_index_t;
 
-/** What a child returns for the node to go on. IDLE: a node of another type. */
-static const canopy_status_t canopy_sequence_go_on[CANOPY_NODE_TYPES] = {
+/**
+ * What a child returns for a node of this type to go on; IDLE for the other types. As long as the table's index can be,
+ * so that a type that does not exist needs no test in the loop. (Words, since bytes would cost four instructions a leaf.)
+ */
+static const canopy_status_t canopy_sequence_statuses[UINT8_MAX + 1] = {
     [CANOPY_NODE_SEQUENCE] = CANOPY_SUCCESS,
     [CANOPY_NODE_REACTIVE_SEQUENCE] = CANOPY_SUCCESS,
     [CANOPY_NODE_FALLBACK] = CANOPY_FAILURE,
     [CANOPY_NODE_REACTIVE_FALLBACK] = CANOPY_FAILURE,
 };
+
+static inline canopy_status_t canopy_sequence_go_on(const canopy_node_t *at)
+{
+    return canopy_sequence_statuses[at->type];
+}
 
 static inline bool canopy_sequence_is_reactive(const canopy_node_t *at)
 {
@@ -97,7 +105,7 @@ static CANOPY_SELDOM canopy_index_t canopy_sequence_skipped(canopy_tree_instance
     }
     for (canopy_index_t child = node + 1u; child != next; child = nodes[child].end) {
         if ((self->status[child] & (uint8_t)~CANOPY_STATUS_WAS) != (uint8_t)CANOPY_SKIPPED) {
-            status = canopy_sequence_go_on[nodes[node].type];
+            status = canopy_sequence_go_on(&nodes[node]);
         }
     }
     return canopy_sequence_complete(self, node, status);
@@ -127,7 +135,7 @@ static CANOPY_SELDOM canopy_index_t canopy_sequence_odd_leaf(canopy_tree_instanc
     const canopy_node_t *at = &self->tree->nodes[node];
 
     status = canopy_leaf_checked(self, (uint16_t)leaf, status);
-    return canopy_sequence_child(self, at, node, leaf, leaf + 1u, status, canopy_sequence_go_on[at->type]);
+    return canopy_sequence_child(self, at, node, leaf, leaf + 1u, status, canopy_sequence_go_on(at));
 }
 
 /**
