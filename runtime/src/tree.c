@@ -270,7 +270,7 @@ canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now
     self->now = now;
     for (;;) {
         const canopy_node_t *at = &nodes[node];
-        canopy_status_t go_on = canopy_sequence_go_on[at->type];
+        canopy_status_t go_on = canopy_sequence_go_on(at);
         canopy_index_t step;
 
         if (go_on != CANOPY_IDLE) {
@@ -290,7 +290,7 @@ canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now
             }
             node = at->parent;
             at = &nodes[node];
-            go_on = canopy_sequence_go_on[at->type];
+            go_on = canopy_sequence_go_on(at);
             if (go_on == CANOPY_IDLE) {
                 step = child_done(self, node, child, status);
                 continue;
