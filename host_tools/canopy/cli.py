@@ -13,6 +13,7 @@ from canopy import __version__
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),
@@ -54,5 +55,6 @@ def main() -> None:
     \b
     Examples:
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o generated
+      canopy check trees/get_home.xml --dbc nao.dbc --node Controller
       canopy monitor --model generated/get_home.model.json --can socketcan:vcan0
     """

@@ -11,6 +11,11 @@
 Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction unless it says so), `reads` and `writes`
 (messages of the DBC, separated by spaces), `stale` (what the leaf returns while a message it reads is not fresh:
 FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the leaf's own state).
+
+Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that the
+leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one cleans up
+after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps a
+condition's threshold from chattering).
 """
 
 from __future__ import annotations
@@ -21,9 +26,12 @@ from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.xml_reader import Element
 
-METADATA = ("kind", "reads", "writes", "stale", "state")
+METADATA = ("kind", "reads", "writes", "stale", "state", "returns", "undoes", "achieves", "moves", "hysteresis")
 ACTION_KINDS = ("SyncAction", "StatefulAction")
 STALE = ("FAILURE", "SUCCESS")
+# What a leaf of each kind may say that it returns.
+COMPLETED = ("SUCCESS", "FAILURE", "SKIPPED")
+RETURNS = {"Condition": COMPLETED, "SyncAction": COMPLETED, "StatefulAction": ("RUNNING", *COMPLETED)}
 
 # Type names of ports: C++ and C spellings on the left.
 PORT_TYPES = {
@@ -88,6 +96,11 @@ class Leaf:
     writes: tuple[str, ...] = ()
     stale: str = "FAILURE"
     state: str | None = None
+    returns: tuple[str, ...] = ()
+    undoes: tuple[str, ...] = ()
+    achieves: tuple[str, ...] = ()
+    moves: tuple[str, ...] = ()
+    hysteresis: str = ""
 
     @property
     def c_name(self) -> str:
@@ -130,6 +143,21 @@ def _one_of(draft: _Draft, key: str, allowed: tuple[str, ...], default: str) -> 
     return value
 
 
+def _words(draft: _Draft, key: str) -> tuple[str, ...]:
+    return tuple(draft.metadata.get(key, ("", None))[0].split())
+
+
+def _returns(draft: _Draft, kind: str) -> tuple[str, ...]:
+    for status in _words(draft, "returns"):
+        if status not in RETURNS[kind]:
+            raise CompileError(
+                draft.metadata["returns"][1],
+                f"metadata returns: a {kind} does not return '{status}'",
+                f"allowed: {', '.join(RETURNS[kind])}",
+            )
+    return _words(draft, "returns")
+
+
 def _read_leaf(element: Element) -> Leaf:
     leaf_id = element.attributes.get("ID", "")
     if not leaf_id:
@@ -166,10 +194,15 @@ def _read_leaf(element: Element) -> Leaf:
         kind=kind,
         place=element.place,
         ports=tuple(draft.ports),
-        reads=tuple(draft.metadata.get("reads", ("", None))[0].split()),
-        writes=tuple(draft.metadata.get("writes", ("", None))[0].split()),
+        reads=_words(draft, "reads"),
+        writes=_words(draft, "writes"),
         stale=_one_of(draft, "stale", STALE, "FAILURE"),
         state=state,
+        returns=_returns(draft, kind),
+        undoes=_words(draft, "undoes"),
+        achieves=_words(draft, "achieves"),
+        moves=_words(draft, "moves"),
+        hysteresis=draft.metadata.get("hysteresis", ("", None))[0],
     )
 
 
