@@ -88,18 +88,14 @@ def _threshold(value: int, count: int) -> int:
     return value if value >= 0 else max(count + value + 1, 0)
 
 
-def _parallel_statuses(
-    children: Sequence[Statuses], needed: int, failures_needed: int, skip_succeeds: bool
+def _completing(
+    children: Sequence[Statuses], count: int, needed: int, failures_needed: int, good: Statuses
 ) -> Statuses:
-    count = len(children)
-    good = {S, K} if skip_succeeds else {S}
-    can_succeed = sum(bool(child & good) for child in children)
-    can_fail = sum(F in child for child in children)
+    """What a parallel node of `count` children can return when `children` are ticked; `good` counts as success."""
     result = set()
-    if can_succeed >= needed and any(S in child for child in children):
+    if sum(bool(child & good) for child in children) >= needed:
         result.add(S)
-    if sum(child == {S} for child in children) >= needed:
-        return frozenset(result)  # enough of them succeed whatever the others do
+    can_fail = sum(F in child for child in children)
     if can_fail >= failures_needed or can_fail > count - needed:
         result.add(F)
     if any(child & {R, K} for child in children):
@@ -111,13 +107,15 @@ def _parallel_statuses(
 
 def _parallel(node: Node, children: Sequence[Statuses]) -> Outcome:
     count = len(children)
-    needed, failures = (_threshold(value, count) for value in node.parameters)
+    needed, failures_needed = (_threshold(value, count) for value in node.parameters)
+    good = frozenset((S, K) if node.parameters[0] < 0 else (S,))
     certain = 0
     ticked = []
     for child in children:
         ticked.append(certain < needed)
         certain += child == {S}
-    return Outcome(_parallel_statuses(children, needed, failures, node.parameters[0] < 0), tuple(ticked))
+    reached = [child for child, is_reached in zip(children, ticked, strict=True) if is_reached]
+    return Outcome(_completing(reached, count, needed, failures_needed, good), tuple(ticked))
 
 
 def _parallel_all(node: Node, children: Sequence[Statuses]) -> Outcome:
@@ -143,7 +141,9 @@ def _reactive_parallel(node: Node, children: Sequence[Statuses]) -> Outcome:
         if all(K in child for child in children):
             result.add(K)
         return _all(frozenset(result), children)
-    return _all(_parallel_statuses(children, needed, count + 1, skip_succeeds=False), children)
+    if sum(child == {S} for child in children) >= needed:
+        return _all(frozenset((S,)), children)
+    return _all(_completing(children, count, needed, count + 1, frozenset((S,))), children)
 
 
 def _if_then_else(_node: Node, children: Sequence[Statuses]) -> Outcome:
