@@ -14,6 +14,7 @@ from canopy import __version__
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
+    "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
