@@ -292,7 +292,14 @@ def test_every_rule_says_what_why_and_how_out() -> None:
         assert all(text and "|" not in text for text in (rule.title, rule.why, rule.way_out))
 
 
+@pytest.mark.timeout(30)
 def test_a_deep_tree_is_checked_in_time(tmp_path: Path) -> None:
     depth = 3_000
     file = write(tmp_path, "<Sequence><Ready/>" * depth + "<Go/>" + "</Sequence>" * depth)
     assert run(file, "-q").exit_code == 0
+
+
+@pytest.mark.timeout(30)
+def test_a_wide_tree_is_checked_in_time(tmp_path: Path) -> None:
+    siblings = "<Fallback><Ready/><Walk speed='1'/></Fallback>" * 10_000
+    assert run(write(tmp_path, f"<Sequence>{siblings}</Sequence>"), "-q").exit_code == 0

@@ -80,16 +80,18 @@ class Facts:
                 result |= {id(c) for c, ticked in zip(node.children, self.ticked(node), strict=True) if ticked}
         return result
 
-    def elements(self, file: str) -> list[Element]:
-        """Every element of one of the tree's files, in no particular order."""
+    def _file(self, file: str) -> dict[tuple[int, int], Element]:
         if file not in self._elements:
             self._elements[file] = elements_by_place(Path(file))
-        return list(self._elements[file].values())
+        return self._elements[file]
+
+    def elements(self, file: str) -> list[Element]:
+        """Every element of one of the tree's files, in no particular order."""
+        return list(self._file(file).values())
 
     def element(self, place: Place) -> Element | None:
         """The XML element that begins at `place`: what the tree's Node does not keep, it still says."""
-        self.elements(place.file)
-        return self._elements[place.file].get((place.line, place.column))
+        return self._file(place.file).get((place.line, place.column))
 
 
 def elements_by_place(path: Path) -> dict[tuple[int, int], Element]:

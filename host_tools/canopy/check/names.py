@@ -6,6 +6,8 @@ Only a guess, for trees that declare neither `undoes` nor `achieves`; a declarat
 
 from __future__ import annotations
 
+from functools import cache
+
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.names import snake
 
@@ -35,6 +37,7 @@ def _words(leaf: Leaf) -> list[str]:
     return [word for word in snake(leaf.id).split("_") if word]
 
 
+@cache
 def undoes(later: Leaf, earlier: Leaf) -> bool:
     """Does `later` clean up what `earlier` has done?"""
     if later.undoes:
@@ -58,6 +61,7 @@ def _stem(word: str) -> str:
     return word
 
 
+@cache
 def achieves(action: Leaf, condition: Leaf) -> bool:
     """Does `action` make `condition` true? OpenDoor achieves DoorOpen, IsDoorOpen, and DoorOpened."""
     if action.achieves:

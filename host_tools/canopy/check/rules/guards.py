@@ -45,10 +45,10 @@ def skipped_cleanup(facts: Facts) -> Iterator[Hit]:
 
 
 def _skipped_in(facts: Facts, parent: Node) -> Iterator[Hit]:
-    done: list[tuple[int, Leaf]] = []
+    done: dict[str, tuple[int, Leaf]] = {}  # the last use of each leaf: trees may have thousands of siblings
     for index, child in enumerate(parent.children):
         cleaner = through_decorators(child)
-        for earlier, opener in done:
+        for earlier, opener in done.values():
             if cleaner.leaf is None or not undoes(cleaner.leaf, opener):
                 continue
             for failing in parent.children[earlier + 1 : index]:
@@ -59,7 +59,7 @@ def _skipped_in(facts: Facts, parent: Node) -> Iterator[Hit]:
                         f"skipped when {label(failing)} (line {failing.place.line}) fails",
                     )
                     break
-        done.extend((index, leaf) for _, leaf in facts.leaves(child) if leaf.kind != "Condition")
+        done |= {leaf.id: (index, leaf) for _, leaf in facts.leaves(child) if leaf.kind != "Condition"}
 
 
 @rule(
@@ -106,7 +106,7 @@ def no_hysteresis(facts: Facts) -> Iterator[Hit]:
             continue
         for index, child in enumerate(parent.children):
             guard = through_decorators(child)
-            if guard.leaf is None or guard.leaf.kind != "Condition" or guard.leaf.hysteresis:
+            if guard.leaf is None or guard.leaf.kind != "Condition" or guard.leaf.hysteresis or not guard.leaf.reads:
                 continue
             for later in parent.children[index + 1 :]:
                 for action, leaf in facts.leaves(later):
