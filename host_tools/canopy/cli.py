@@ -14,6 +14,9 @@ from canopy import __version__
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
+    "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
+    "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
+    "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),
@@ -55,5 +58,6 @@ def main() -> None:
     \b
     Examples:
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o generated
+      canopy check trees/get_home.xml --dbc nao.dbc --node Controller
       canopy monitor --model generated/get_home.model.json --can socketcan:vcan0
     """

@@ -13,6 +13,11 @@ Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction 
 FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state).
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
+
+Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that the
+leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one cleans up
+after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps a
+condition's threshold from chattering).
 """
 
 from __future__ import annotations
@@ -25,10 +30,13 @@ from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
 
-METADATA = ("kind", "reads", "writes", "stale", "state")
+METADATA = ("kind", "reads", "writes", "stale", "state", "returns", "undoes", "achieves", "moves", "hysteresis")
 ACTION_KINDS = ("SyncAction", "StatefulAction")
 INNER_KINDS = ("Control", "Decorator")
 STALE = ("FAILURE", "SUCCESS")
+# What a leaf of each kind may say that it returns.
+COMPLETED = ("SUCCESS", "FAILURE", "SKIPPED")
+RETURNS = {"Condition": COMPLETED, "SyncAction": COMPLETED}  # any other kind: these, and RUNNING
 PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
     "input_port": "in",
     "output_port": "out",
@@ -72,6 +80,11 @@ class Leaf:
     writes: tuple[str, ...] = ()
     stale: str = "FAILURE"
     state: str | None = None
+    returns: tuple[str, ...] = ()
+    undoes: tuple[str, ...] = ()
+    achieves: tuple[str, ...] = ()
+    moves: tuple[str, ...] = ()
+    hysteresis: str = ""
 
     @property
     def c_name(self) -> str:
@@ -135,6 +148,22 @@ def _one_of(draft: _Draft, key: str, allowed: tuple[str, ...], default: str) -> 
     return value
 
 
+def _words(draft: _Draft, key: str) -> tuple[str, ...]:
+    return tuple(draft.metadata.get(key, ("", None))[0].split())
+
+
+def _returns(draft: _Draft, kind: str) -> tuple[str, ...]:
+    allowed = RETURNS.get(kind, ("RUNNING", *COMPLETED))
+    for status in _words(draft, "returns"):
+        if status not in allowed:
+            raise CompileError(
+                draft.metadata["returns"][1],
+                f"metadata returns: a {kind} does not return '{status}'",
+                f"allowed: {', '.join(allowed)}",
+            )
+    return _words(draft, "returns")
+
+
 def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
     draft = _Draft()
     for child in element.children:
@@ -179,10 +208,15 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         kind=kind,
         place=element.place,
         ports=tuple(draft.ports),
-        reads=tuple(draft.metadata.get("reads", ("", None))[0].split()),
-        writes=tuple(draft.metadata.get("writes", ("", None))[0].split()),
+        reads=_words(draft, "reads"),
+        writes=_words(draft, "writes"),
         stale=_one_of(draft, "stale", STALE, "FAILURE"),
         state=state,
+        returns=_returns(draft, kind),
+        undoes=_words(draft, "undoes"),
+        achieves=_words(draft, "achieves"),
+        moves=_words(draft, "moves"),
+        hysteresis=draft.metadata.get("hysteresis", ("", None))[0],
     )
 
 

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""`canopy check`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+
+from canopy.check.output import as_json, as_sarif, print_text
+from canopy.check.registry import Rule, Severity, all_rules, table
+from canopy.check.run import BusOptions, Report, check
+from canopy.compiler.errors import CompileError, nearest
+
+FOUND = 1
+INPUT_ERROR = 2
+
+
+def _print_rules(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value:
+        click.echo(table(), nl=False)
+        context.exit()
+
+
+def _wanted(disable: tuple[str, ...], least: Severity) -> list[Rule]:
+    rules = all_rules()
+    for name in disable:
+        if name not in rules:
+            raise click.BadParameter(f"no rule '{name}'; {nearest(name, rules)}", param_hint="--disable")
+    return [rule for rule in rules.values() if rule.id not in disable and rule.severity >= least]
+
+
+@click.command()
+@click.argument("trees", metavar="TREE…", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: names of signals are checked, too.")
+@click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
+@click.option(
+    "--period-ms", default=1, type=click.IntRange(1, 3_600_000), help="Also check the cycle times against it."
+)
+@click.option(
+    "--severity",
+    type=click.Choice([severity.label for severity in Severity]),
+    default="note",
+    show_default=True,
+    help="Least severity that is looked for.",
+)
+@click.option("--disable", multiple=True, metavar="RULE", help="Leave a rule out; may be given several times.")
+@click.option("--strict", is_flag=True, help="Exit with status 1 for warnings, too.")
+@click.option("--json", "json_", is_flag=True, help="Print JSON.")
+@click.option("--sarif", is_flag=True, help="Print SARIF 2.1.0, for code hosts and editors.")
+@click.option("-q", "--quiet", is_flag=True, help="Without the help lines.")
+@click.option("--rules", is_flag=True, is_eager=True, expose_value=False, callback=_print_rules, help="List the rules.")
+def command(
+    trees: tuple[Path, ...],
+    dbc: Path | None,
+    node: str | None,
+    period_ms: int,
+    severity: str,
+    disable: tuple[str, ...],
+    strict: bool,
+    json_: bool,
+    sarif: bool,
+    quiet: bool,
+) -> None:
+    """Find mistakes in each TREE that a compiler accepts and a robot regrets (docs/lint.md).
+
+    A node allows a rule with a marker in its _description: "canopy:allow hidden-failure: waving is only polite".
+
+    Exit status: 0 nothing serious, 1 errors found (with --strict: or warnings), 2 a file cannot be read or compiled.
+
+    \b
+    Examples:
+      canopy check trees/get_home.xml --dbc nao.dbc --node Controller
+      canopy check trees/*.xml --strict --disable root-can-fail
+      canopy check trees/*.xml --sarif > canopy.sarif
+    """
+    if (dbc is None) != (node is None):
+        raise click.UsageError("--dbc and --node go together")
+    if json_ and sarif:
+        raise click.UsageError("--json or --sarif, not both")
+    rules = _wanted(disable, Severity[severity.upper()])
+    bus = BusOptions(dbc, node, period_ms) if dbc is not None and node is not None else None
+    report = Report()
+    unreadable = False
+    for tree in trees:
+        try:
+            one = check(tree, rules, bus)
+        except CompileError as error:
+            click.echo(str(error), err=True)
+            unreadable = True
+            continue
+        report.findings += one.findings
+        report.allowed += one.allowed
+    if json_:
+        click.echo(json.dumps(as_json(report), indent=1, ensure_ascii=False))
+    elif sarif:
+        click.echo(json.dumps(as_sarif(report, rules), indent=1, ensure_ascii=False))
+    elif report.findings or not unreadable:
+        print_text(report, quiet=quiet)
+    if unreadable:
+        sys.exit(INPUT_ERROR)
+    worst = max((finding.rule.severity for finding in report.findings), default=Severity.NOTE)
+    sys.exit(FOUND if worst >= (Severity.WARNING if strict else Severity.ERROR) else 0)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""Reads a tree, asks every rule, and leaves out what the tree's author has allowed.
+
+A node allows a rule with a marker in its `_description`, which editors show and keep:
+
+    <ForceSuccess _description="canopy:allow hidden-failure: waving is only polite">
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from canopy.check.facts import Facts, elements_by_place
+from canopy.check.registry import Hit, Rule, all_rules
+from canopy.check.rules.declarations import writing_conditions
+from canopy.compiler.emit import load_application
+from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.tree_reader import Tree, read_tree
+from canopy.compiler.xml_reader import Element
+
+_ALLOW = re.compile(r"canopy:allow\s+([\w-]+(?:\s*,\s*[\w-]+)*)")
+_BITRATE = 500_000
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One hit of one rule."""
+
+    rule: Rule
+    place: Place
+    message: str
+    help_text: str
+    node: str | None
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.rule.severity.label}: {self.message} [{self.rule.id}]\n  help: {self.help_text}"
+
+
+@dataclass
+class Report:
+    """What was found in some files, and how many findings their authors have allowed."""
+
+    findings: list[Finding] = field(default_factory=list)
+    allowed: int = 0
+
+
+@dataclass(frozen=True)
+class BusOptions:
+    """The bus that the names of signals are checked against."""
+
+    dbc: Path
+    node: str
+    period_ms: int = 1
+
+
+def _allowed(element: Element) -> set[str]:
+    text = " ".join(
+        (element.attributes.get("_description", ""), element.attributes.get("description", ""), element.text)
+    )
+    found = {name.strip() for match in _ALLOW.finditer(text) for name in match[1].split(",")}
+    for name in sorted(found - all_rules().keys()):
+        raise CompileError(element.place, f"canopy:allow: no rule '{name}'", nearest(name, all_rules()))
+    return found
+
+
+def _finding(rule: Rule, hit: Hit) -> Finding:
+    return Finding(rule, hit.place, hit.message, hit.help_text or rule.way_out, hit.node.name if hit.node else None)
+
+
+def _load(path: Path, bus: BusOptions | None) -> Tree:
+    if bus is None:
+        return read_tree(path)
+    return load_application("check", path, bus.dbc, bus.node, bus.period_ms, _BITRATE).table.tree
+
+
+def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Finding]:
+    """The findings that explain why the compiler refuses the file; raises its error when none does."""
+    hits = [
+        hit
+        for element in elements_by_place(path).values()
+        if element.tag == "TreeNodesModel"
+        for hit in writing_conditions(element)
+    ]
+    if error.place not in [hit.place for hit in hits]:
+        raise error
+    rule = all_rules()["condition-writes"]
+    return [_finding(rule, hit) for hit in hits] if rule in rules else []
+
+
+def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None) -> Report:
+    """Asks `rules` about the tree in a file; findings in the order of the file.
+
+    Raises:
+        CompileError: the tree or the bus cannot be compiled, or a canopy:allow names no rule.
+    """
+    wanted = list(rules)
+    report = Report()
+    try:
+        facts = Facts(_load(path, bus))
+    except CompileError as error:
+        report.findings = _refused(path, wanted, error)
+        return report
+    files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
+    allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
+    for rule in wanted:
+        for hit in rule.run(facts):
+            if rule.id in allowed.get(hit.place, ()):
+                report.allowed += 1
+            else:
+                report.findings.append(_finding(rule, hit))
+    report.findings.sort(key=lambda f: (f.place.file, f.place.line, f.place.column, -f.rule.severity, f.rule.id))
+    return report

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""`canopy fmt`: tree files in one canonical form (docs/tools.md)."""

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""`canopy show`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from canopy.compiler.errors import CompileError
+from canopy.compiler.tree_reader import read_tree
+from canopy.show.dot import dot
+from canopy.show.svg import svg
+from canopy.show.terminal import print_tree
+
+INPUT_ERROR = 2
+
+
+def _write(target: str, text: str) -> None:
+    if target == "-":
+        click.echo(text, nl=False)
+        return
+    try:
+        Path(target).write_text(text, encoding="utf-8")
+    except OSError as error:
+        click.echo(f"{target}: error: cannot be written: {error.strerror}", err=True)
+        sys.exit(INPUT_ERROR)
+
+
+@click.command()
+@click.argument("tree", type=click.Path(path_type=Path))
+@click.option("--svg", "svg_file", metavar="FILE", help="Draw it as SVG into FILE; - is standard output.")
+@click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
+def command(tree: Path, svg_file: str | None, dot_file: str | None) -> None:
+    """Draw TREE: in the terminal, as SVG, or as DOT.
+
+    → Sequence, ? Fallback, ⇉ Parallel, * with memory (BehaviorTree.CPP's Sequence and Fallback have one, the Reactive
+    ones not), δ decorator, (condition), [action].
+
+    \b
+    Examples:
+      canopy show trees/get_home.xml
+      canopy show trees/get_home.xml --svg get_home.svg
+      canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
+    """
+    try:
+        checked = read_tree(tree)
+    except CompileError as error:
+        click.echo(str(error), err=True)
+        sys.exit(INPUT_ERROR)
+    if svg_file is not None:
+        _write(svg_file, svg(checked))
+    if dot_file is not None:
+        _write(dot_file, dot(checked))
+    if svg_file is None and dot_file is None:
+        print_tree(checked)

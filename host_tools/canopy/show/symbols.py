@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The usual signs, shapes and colours of behaviour trees, once for all pictures.
+
+The paper's signs: → Sequence, ? Fallback, ⇉ Parallel; δ for decorators. A star, as in Colledanchise & Ögren's book,
+marks a node with memory: BehaviorTree.CPP's Sequence is →*, its ReactiveSequence the paper's →.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from canopy.compiler.tree_reader import Node
+
+Shape = Literal["box", "oval", "diamond"]
+
+# type -> (sign, the same in ASCII)
+SIGNS = {
+    "ReactiveSequence": ("→", "->"),
+    "Sequence": ("→*", "->*"),
+    "SequenceWithMemory": ("→**", "->**"),
+    "AsyncSequence": ("→*", "->*"),
+    "ReactiveFallback": ("?", "?"),
+    "Fallback": ("?*", "?*"),
+    "AsyncFallback": ("?*", "?*"),
+    "Parallel": ("⇉*", "=>*"),
+    "ParallelAll": ("⇉*", "=>*"),
+    "ReactiveParallel": ("⇉", "=>"),
+}
+# Types whose sign alone does not say which one is meant.
+AMBIGUOUS = ("AsyncSequence", "AsyncFallback", "ParallelAll")
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a node looks: sign ("" for leaves), what is written with it, shape, fill and line colour (for pictures)."""
+
+    sign: str
+    text: str
+    shape: Shape
+    fill: str
+    line: str
+    style: str
+
+
+def parameter_text(node: Node) -> str:
+    """The parameters as `3` or `success_count=1 failure_count=2`."""
+    named = list(zip((parameter.name for parameter in node.type.parameters), node.parameters, strict=False))
+    return str(named[0][1]) if len(named) == 1 else " ".join(f"{name}={value}" for name, value in named)
+
+
+def look(node: Node, *, ascii_only: bool = False) -> Look:
+    """The look of a node. `style` is rich's, for terminals."""
+    own_name = node.name if node.name != node.type.name else ""
+    parameters = parameter_text(node)
+    if node.type.category == "LEAF":
+        text = node.name if node.leaf is not None or not parameters else f"{node.name} {parameters}"
+        if node.type.name in ("Condition", "WasEntryUpdated"):
+            return Look("", text, "oval", "#c9efc4", "#2f7d32", "green")
+        if node.leaf is None:
+            return Look("", text, "box", "#e8e8e8", "#666666", "bright_black")
+        return Look("", text, "box", "#ffffff", "#333333", "bold")
+    if node.type.category == "CONTROL":
+        sign = SIGNS[node.type.name][ascii_only] if node.type.name in SIGNS else node.type.name
+        kind = node.type.name if node.type.name in AMBIGUOUS else ""
+        more = f"[{parameters}]" if parameters else ""
+        text = " ".join(part for part in (kind, more, own_name) if part)
+        return Look(sign, text, "box", "#dce8f7", "#2b5c9e", "bold cyan")
+    more = f" {parameters}" if parameters else ""
+    text = f"{node.type.name}{more}" + (f" {own_name}" if own_name else "")
+    return Look("d" if ascii_only else "δ", text, "diamond", "#fdf0c8", "#9a7414", "yellow")

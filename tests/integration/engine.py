@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""The real engine in this process: runtime/src as a shared library, ticked through ctypes with Python leaves."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shlex
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from canopy.compiler.table import make_table
+from canopy.compiler.tree_reader import Node, Tree
+
+RUNTIME = Path(__file__).parents[2] / "runtime"
+IDLE, RUNNING, SUCCESS, FAILURE, SKIPPED = range(5)
+NAMES = ("IDLE", "RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
+
+_TICK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint16)
+_HALTED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint16)
+
+
+class _Node(ctypes.Structure):
+    _fields_ = (
+        ("type", ctypes.c_uint8),
+        ("reserved", ctypes.c_uint8),
+        *((name, ctypes.c_uint16) for name in ("parent", "end", "state", "leaf", "parameter")),
+    )
+
+
+class _Leaf(ctypes.Structure):
+    _fields_ = (("tick", _TICK), ("running", _TICK), ("halted", _HALTED))
+
+
+class _Tree(ctypes.Structure):
+    _fields_ = (
+        ("nodes", ctypes.POINTER(_Node)),
+        ("leaves", ctypes.POINTER(_Leaf)),
+        ("controls", ctypes.c_void_p),
+        ("scripts", ctypes.c_void_p),
+        ("parameters", ctypes.POINTER(ctypes.c_int32)),
+        *((f"{name}_count", ctypes.c_uint16) for name in ("node", "leaf", "control", "script", "parameter", "word")),
+    )
+
+
+class _Instance(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("tree", "application", "status", "words")),
+        ("now", ctypes.c_uint64),
+        ("faults", ctypes.c_uint32),
+        ("fault_node", ctypes.c_uint16),
+    )
+
+
+def build(folder: Path) -> ctypes.CDLL:
+    """Compiles the runtime with $CC (cc) into `folder`."""
+    library = folder / "libcanopy_engine.so"
+    sources = [str(RUNTIME / "src" / name) for name in ("tree.c", "tree_validate.c")]
+    compiler = [*shlex.split(os.environ.get("CC", "cc")), "-std=c11", "-O1", "-shared", "-fPIC"]
+    subprocess.run([*compiler, f"-I{RUNTIME / 'include'}", *sources, "-o", str(library)], check=True)
+    return ctypes.CDLL(str(library))
+
+
+class Engine:
+    """A tree whose leaf nodes return what `answer(index)` says; `calls` has each call as (node's index, what)."""
+
+    def __init__(self, library: ctypes.CDLL, tree: Tree, answer: Callable[[int], int]) -> None:
+        self.calls: list[tuple[int, str]] = []
+        self._answer = answer
+        self._library = library
+        table = make_table(tree)
+        self.nodes = [row.node for row in table.rows]
+        self._index = {id(node): index for index, node in enumerate(self.nodes)}
+        self._nodes = (_Node * len(table.rows))(
+            *(_Node(r.node.type.number, 0, r.parent, r.end, r.state, r.leaf, r.parameter) for r in table.rows)
+        )
+        self._leaves = (_Leaf * max(1, len(table.leaves)))(*(self._leaf(use.nodes) for use in table.leaves))
+        self._parameters = (ctypes.c_int32 * max(1, len(table.parameters)))(*table.parameters)
+        counts = (len(table.rows), len(table.leaves), 0, 0, len(table.parameters), table.words)
+        self._tree = _Tree(self._nodes, self._leaves, None, None, self._parameters, *counts)
+        self._status = (ctypes.c_uint8 * len(table.rows))()
+        self._words = (ctypes.c_uint16 * max(1, table.words))()
+        self._self = _Instance()
+        if library.canopy_tree_validate(ctypes.byref(self._tree), None) != 0:
+            raise ValueError("canopy_tree_validate() refuses the tables")
+        library.canopy_tree_init(
+            ctypes.byref(self._self), ctypes.byref(self._tree), self._status, self._words, ctypes.c_void_p()
+        )
+
+    def _leaf(self, uses: list[Node]) -> _Leaf:
+        def call(what: str) -> Callable[[int | None, int], int]:
+            def run(_application: int | None, parameter: int) -> int:
+                index = self._index[id(uses[parameter])]
+                self.calls.append((index, what))
+                return self._answer(index) if what != "halt" else 0
+
+            return run
+
+        halted = call("halt")
+        return _Leaf(_TICK(call("tick")), _TICK(call("running")), _HALTED(lambda a, p: (halted(a, p), None)[1]))
+
+    def tick(self, now_us: int = 0) -> int:
+        """One tick; `calls` is empty before it."""
+        self.calls.clear()
+        return int(self._library.canopy_tree_tick(ctypes.byref(self._self), ctypes.c_uint64(now_us)))
+
+    def status(self, index: int) -> int:
+        """What the node returned in the last tick that ticked it."""
+        return self._status[index] & 7
+
+    def called(self, what: str | None = None) -> list[str]:
+        """Names of the leaves called in the last tick, in order; `what`: tick, running or halt only."""
+        return [self.nodes[index].name for index, done in self.calls if what in (None, done)]
