@@ -13,6 +13,7 @@ from canopy import __version__
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),

@@ -15,7 +15,7 @@ from canopy.compiler.table import Table
 
 # (size, alignment) on a 32-bit target with 8-byte alignment of 64-bit integers: Arm EABI and RISC-V ILP32.
 SIZES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
-SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4}
+SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
 
 
 def struct_size(members: Iterable[tuple[int, int]]) -> tuple[int, int]:
@@ -55,7 +55,8 @@ class Budget:
 
 
 def _message_struct(message: Message, *, received: bool) -> tuple[int, int]:
-    return struct_size([*(scalar(s.c_type) for s in message.signals), *([scalar("bool")] if received else [])])
+    flags = 1 + len(message.multiplexed) if received else 0
+    return struct_size([*(scalar(s.c_type) for s in message.signals), *[scalar("bool")] * flags])
 
 
 def ram_bytes(table: Table, bus: Bus) -> int:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import tempfile
@@ -130,9 +131,17 @@ def model(application: Application) -> dict[str, object]:
     }
 
 
-def _stale_test(leaf: Leaf) -> str:
-    messages = sorted({name.partition(".")[0] for name in leaf.reads})
-    return " || ".join(f"!app->input.{snake(message)}.fresh" for message in messages)
+def _stale_test(bus: Bus, leaf: Leaf) -> str:
+    """C: is something that the leaf reads not known? A multiplexed signal that it names must have come, too."""
+    flags = {(m.name, s.name): s.has_name for m in bus.receive for s in m.multiplexed}
+    names = {m.name: m.c_name for m in bus.receive}
+    reads = sorted(
+        {
+            (names[message], flags.get((message, signal), "fresh"))
+            for message, _, signal in (name.partition(".") for name in leaf.reads)
+        }
+    )
+    return " || ".join(f"!app->input.{message}.{flag}" for message, flag in reads)
 
 
 def _parameters(leaf: Leaf, bus: Bus) -> str:
@@ -162,33 +171,50 @@ def _comment(text: str) -> str:
     return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
-def render(application: Application) -> dict[str, str]:
-    """File name -> content. The same input gives the same bytes."""
-    environment = jinja2.Environment(
+def environment(bus: Bus) -> jinja2.Environment:
+    """The templates, with what they call."""
+    result = jinja2.Environment(
         loader=jinja2.PackageLoader("canopy.compiler"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"snake": snake, "comment": _comment}
-    environment.globals |= {
+    result.filters |= {"snake": snake, "comment": _comment}
+    result.globals |= {
         "codec": codec,
-        "stale_test": _stale_test,
+        "stale_test": functools.partial(_stale_test, bus),
         "parameters_of": _parameters,
         "arguments_of": _arguments,
         "TRACE": list(TRACE_LAYOUT),
+        "version": __version__,
     }
-    context = {"app": application, "table": application.table, "bus": application.bus, "version": __version__}
-    bus, name = application.bus.name, application.name
+    return result
+
+
+def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
+    """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
+    templates = environment(bus)
+    return {
+        f"{bus.name}_bus.{suffix}": templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        for suffix in ("h", "c")
+    }
+
+
+def render(application: Application) -> dict[str, str]:
+    """File name -> content. The same input gives the same bytes."""
+    context = {"app": application, "table": application.table, "bus": application.bus}
+    name = application.name
     templates = {
-        f"{bus}_bus.h": "bus.h.j2",
-        f"{bus}_bus.c": "bus.c.j2",
         f"{name}_leaves.h": "leaves.h.j2",
         f"{name}_app.h": "application.h.j2",
         f"{name}_app.c": "application.c.j2",
     }
-    files = {file: environment.get_template(template).render(context) for file, template in templates.items()}
+    files = render_bus(application.bus, application.period_ms)
+    files |= {
+        file: environment(application.bus).get_template(template).render(context)
+        for file, template in templates.items()
+    }
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
     files[application.bus.path.name] = application.bus.path.read_text(encoding="cp1252")
     return files

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""C names for a bus: every message, signal and named value gets one, and no two the same, whatever the DBC calls them.
+
+The first of two that would become the same name keeps it, the second gets `_2`, and so on (messages by id, signals as
+in the DBC). The generated header shows the DBC's name beside each.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+from canopy.compiler.bus_model import Enumerator, Message, Signal
+from canopy.compiler.names import snake
+
+# What may not be a member or a local variable: words of C++ (a C++ program may include the header), macros that
+# compilers define without being asked, and the variables of the generated functions.
+_WORDS = """
+alignas alignof and and_eq asm atomic bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield
+compl concept consteval constexpr constinit const_cast decltype delete dynamic_cast explicit export final friend
+mutable namespace new noexcept not not_eq nullptr operator or or_eq override private protected public
+reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid typename typeof
+using virtual wchar_t xor xor_eq near far linux unix i386 arm errno data in input length limited out output self
+size value choice fresh int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t
+"""
+_TAKEN = frozenset(_WORDS.split())
+_IMAGE_MEMBERS = ("now", "written", "saturated", "halting")
+_BUS_WORDS = ("bus", "bus_h", "codec_h", "input", "output", "rx_messages", "tx_messages", "output_signals")
+_MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")
+
+
+def _free(wanted: str, taken: Iterable[set[str]], prefix: str = "") -> str:
+    """`wanted`, or with the first number from 2 that makes it new in all sets, which get it."""
+    sets = list(taken)
+    number, name = 1, wanted
+    while name in sets[0] or any(prefix + name in names for names in sets[1:]):
+        number += 1
+        name = f"{wanted.rstrip('_')}_{number}"
+    sets[0].add(name)
+    for names in sets[1:]:
+        names.add(prefix + name)
+    return name
+
+
+def _enumerators(signal: Signal, stem: str, everything: set[str]) -> tuple[Enumerator, ...]:
+    result = []
+    for value, text in signal.choices:
+        word = snake(text).strip("_") or f"value_{'minus_' if value < 0 else ''}{abs(value)}"
+        name = _free(f"{stem}_{word}", [everything])
+        result.append(Enumerator(value, text, name.upper()))
+    return tuple(result)
+
+
+def _name_signals(message: Message, everything: set[str]) -> Message:
+    members = set(_TAKEN)
+    named = []
+    for signal in message.signals:
+        wanted = snake(signal.name)
+        c_name = _free(f"{wanted}_" if wanted in _TAKEN else wanted, [members, everything], f"{message.c_name}_")
+        named.append(dataclasses.replace(signal, c_name=c_name))
+    names = {signal.name: signal.c_name for signal in named}
+    for place, signal in enumerate(named):
+        named[place] = dataclasses.replace(
+            signal,
+            enumerators=_enumerators(signal, f"{message.c_name}_{signal.c_name}", everything),
+            selectors=tuple(dataclasses.replace(s, signal=names[s.signal]) for s in signal.selectors),
+            has_name=_free(f"has_{signal.c_name}", [members]) if signal.selectors else "",
+        )
+    return dataclasses.replace(message, signals=tuple(named))
+
+
+def name_messages(messages: tuple[Message, ...]) -> tuple[Message, ...]:
+    """The messages with C names. Selectors name multiplexers as the DBC does before, as C does after.
+
+    Names of messages come first, so that no signal takes one from them.
+    """
+    members = {*_TAKEN, *_IMAGE_MEMBERS}
+    everything = set(_BUS_WORDS)
+    named = []
+    for message in messages:
+        wanted = snake(message.name)
+        wanted = f"{wanted}_" if wanted in members else wanted
+        named.append(dataclasses.replace(message, c_name=_free(wanted, [members, everything])))
+    for message in named:
+        everything |= {f"{message.c_name}_{word}" for word in _MESSAGE_WORDS}
+    return tuple(_name_signals(message, everything) for message in named)
