@@ -67,9 +67,9 @@ static uint32_t parse_ticks(const char *text)
 static options_t parse(int argc, char **argv)
 {
     static const struct option known[] = {
-        {"can", required_argument, NULL, 'c'}, {"lock-step", no_argument, NULL, 'l'},
+        {"can", required_argument, NULL, 'c'},   {"lock-step", no_argument, NULL, 'l'},
         {"ticks", required_argument, NULL, 't'}, {"quiet", no_argument, NULL, 'q'},
-        {"help", no_argument, NULL, 'h'},      {NULL, 0, NULL, 0},
+        {"help", no_argument, NULL, 'h'},        {NULL, 0, NULL, 0},
     };
     options_t result = {0};
     int option;
@@ -120,8 +120,8 @@ static void print_summary(const canopy_can_t *can)
     printf("%s: %" PRIu32 " ticks, %" PRIu32 " overruns, %" PRIu32 " slips, longest cycle %" PRIu64
            " us, most late %" PRIu64 " us\n",
            CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
-    printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32
-           "; sent %" PRIu32 ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
+    printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32 "; sent %" PRIu32
+           ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
            CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, bus->sent,
            bus->tx_dropped, bus->timeouts, CANOPY_APP.tree_instance->faults);
 }

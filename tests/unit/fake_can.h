@@ -14,8 +14,8 @@ typedef struct {
     unsigned rx_count;
     unsigned rx_taken;
     unsigned tx_count;
-    int rx_error;    /* what receive returns when it has nothing: 0, or an error */
-    int tx_result;   /* what send returns */
+    int rx_error;  /* what receive returns when it has nothing: 0, or an error */
+    int tx_result; /* what send returns */
 } fake_can_t;
 
 static inline int fake_can_receive(void *context, canopy_can_frame_t *frame)

@@ -70,8 +70,8 @@ static inline void bench_start(bench_t *bench, const canopy_node_t *nodes, uint1
                                 .word_count = 64}};
     TEST_ASSERT_LESS_OR_EQUAL(NODES_MAX, count);
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&bench->tree, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&bench->instance, &bench->tree, bench->status, bench->words,
-                                                  &bench->script));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_tree_init(&bench->instance, &bench->tree, bench->status, bench->words, &bench->script));
 }
 
 /** Ticks with these results of the leaves ("SFRK": success, failure, running, skipped), expects status and calls. */

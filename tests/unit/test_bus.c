@@ -71,7 +71,12 @@ static void set_now(void *image, canopy_time_t now)
 
 /* The second message has the same number as the first, as an extended id. */
 static const canopy_rx_message_t rx[] = {
-    {.id = SPEED_ID, .length = 3, .data_id = 1, .timeout = TIMEOUT_US, .decode = decode_speed, .set_fresh = speed_fresh},
+    {.id = SPEED_ID,
+     .length = 3,
+     .data_id = 1,
+     .timeout = TIMEOUT_US,
+     .decode = decode_speed,
+     .set_fresh = speed_fresh},
     {.id = PLAIN_ID,
      .flags = CANOPY_CAN_EXTENDED,
      .length = 1,

@@ -36,10 +36,10 @@ static void a_number_is_within_its_ends_only(void)
         uint64_t bits64 = canopy_float64_bits(doubles[place]);
         bool inside = place >= 2u && place <= 5u;
 
-        TEST_ASSERT_EQUAL(inside, canopy_float32_within(bits32, canopy_float32_bits(floats[2]),
-                                                        canopy_float32_bits(floats[5])));
-        TEST_ASSERT_EQUAL(inside, canopy_float64_within(bits64, canopy_float64_bits(doubles[2]),
-                                                        canopy_float64_bits(doubles[5])));
+        TEST_ASSERT_EQUAL(
+            inside, canopy_float32_within(bits32, canopy_float32_bits(floats[2]), canopy_float32_bits(floats[5])));
+        TEST_ASSERT_EQUAL(
+            inside, canopy_float64_within(bits64, canopy_float64_bits(doubles[2]), canopy_float64_bits(doubles[5])));
     }
 }
 

@@ -4,7 +4,10 @@
 #include "nao_home_app.h"
 #include "unity.h"
 
-enum { TICKS_MAX = 24 + 1, WALKED_PER_TICK_MM = 100 }; /* Lemma 11's bound, and the tick that sees that home is reached */
+enum {
+    TICKS_MAX = 24 + 1,
+    WALKED_PER_TICK_MM = 100
+}; /* Lemma 11's bound, and the tick that sees that home is reached */
 
 static nao_in_process_t run;
 

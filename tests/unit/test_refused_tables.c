@@ -119,6 +119,21 @@ static void a_wrong_structure_is_refused(void)
     REFUSED(12, tables.nodes[13].parent = 0);
 }
 
+static void parameters_that_scripts_give_are_looked_at(void)
+{
+    make_good_tables();
+    tables.nodes[12].asks = 1;
+    tables.parameters[10] = 0;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tables.tree, NULL));
+    REFUSED(12, tables.nodes[12].asks = 1); /* script 3 */
+    REFUSED(12, (tables.nodes[12].asks = 1, tables.parameters[10] = -1));
+    REFUSED(12, (tables.nodes[12].asks = 2, tables.parameters[10] = 0)); /* Timeout has one parameter */
+    REFUSED(3, tables.nodes[3].asks = 1);
+    REFUSED(5, tables.nodes[5].asks = 1);
+    REFUSED(6, tables.nodes[6].asks = 1);
+    REFUSED(8, tables.nodes[8].asks = 1);
+}
+
 static void functions_that_are_missing_are_refused(void)
 {
     REFUSED(1, tables.nodes[1].leaf = 2);
@@ -280,6 +295,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(a_wrong_structure_is_refused);
+    RUN_TEST(parameters_that_scripts_give_are_looked_at);
     RUN_TEST(functions_that_are_missing_are_refused);
     RUN_TEST(parameters_that_mean_nothing_are_refused);
     RUN_TEST(state_words_that_are_missing_or_shared_are_refused);

@@ -14,10 +14,10 @@ static int32_t ask(void *application, uint16_t number)
     return answers[number];
 }
 
-#define SCRIPT(number)                               \
+#define SCRIPT(number)                                \
     static int32_t script_##number(void *application) \
-    {                                                \
-        return ask(application, number);             \
+    {                                                 \
+        return ask(application, number);              \
     }
 SCRIPT(0)
 SCRIPT(1)

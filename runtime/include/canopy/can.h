@@ -33,11 +33,11 @@ typedef struct {
 
 /** What a driver has lost and seen since it was opened. Counters only grow. */
 typedef struct {
-    uint32_t received;     /**< Frames handed to the loop. */
-    uint32_t sent;         /**< Frames taken over by the hardware or the kernel. */
-    uint32_t rx_dropped;   /**< Frames lost before the loop could take them. */
-    uint32_t tx_dropped;   /**< Frames that send() could not take (returned 0 or an error). */
-    uint32_t error_frames; /**< Error frames seen. */
+    uint32_t received;      /**< Frames handed to the loop. */
+    uint32_t sent;          /**< Frames taken over by the hardware or the kernel. */
+    uint32_t rx_dropped;    /**< Frames lost before the loop could take them. */
+    uint32_t tx_dropped;    /**< Frames that send() could not take (returned 0 or an error). */
+    uint32_t error_frames;  /**< Error frames seen. */
     uint32_t rx_high_water; /**< Most frames ever waiting in the driver's own queue; 0 when it has none. */
 } canopy_can_stats_t;
 

@@ -27,17 +27,18 @@ typedef struct {
     const canopy_bus_t *bus;
     const canopy_trace_config_t *trace;
     void *memory; /**< The application's one static object; handed to the leaves' functions. The rest lies in it: */
-    void (*start)(void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
+    void (*start)(
+        void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
     canopy_tree_instance_t *tree_instance;
-    uint8_t *status;              /**< tree->node_count. */
-    uint16_t *words;              /**< tree->word_count. */
+    uint8_t *status; /**< tree->node_count. */
+    uint16_t *words; /**< tree->word_count. */
     canopy_bus_state_t *bus_state;
-    void *input;                  /**< The input image. */
-    void *output;                 /**< The output image. */
-    canopy_rx_state_t *rx;        /**< bus->rx_count. */
-    uint8_t *tx_counters;         /**< bus->tx_count. */
+    void *input;           /**< The input image. */
+    void *output;          /**< The output image. */
+    canopy_rx_state_t *rx; /**< bus->rx_count. */
+    uint8_t *tx_counters;  /**< bus->tx_count. */
     canopy_trace_state_t *trace_state;
-    uint8_t *sent;                /**< tree->node_count. */
+    uint8_t *sent; /**< tree->node_count. */
 } canopy_app_t;
 
 /** Numbers of the fault hook; stable. */

@@ -13,8 +13,8 @@
  * Raw value of a physical constant, rounded to the nearest. For constant expressions only, which the compiler folds:
  * then no floating point is left in the program (the build checks the runtime for that, not your leaves).
  */
-#define CANOPY_RAW(type, physical, scale, offset)                                                                      \
-    ((type)(((((physical) - (offset)) / (scale)) < 0.0) ? (((physical) - (offset)) / (scale)) - 0.5                    \
+#define CANOPY_RAW(type, physical, scale, offset)                                                   \
+    ((type)(((((physical) - (offset)) / (scale)) < 0.0) ? (((physical) - (offset)) / (scale)) - 0.5 \
                                                         : (((physical) - (offset)) / (scale)) + 0.5))
 
 /** Value of a two's complement number in the low `bits` (1..31) of raw; the bits above must be 0. */

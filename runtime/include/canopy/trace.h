@@ -39,10 +39,10 @@ typedef struct {
 
 /** State of the trace of one tree. All zero is the start. */
 typedef struct {
-    uint8_t *sent;        /**< node_count bytes: the status code last sent of each node. */
-    uint16_t next_node;   /**< Where the next snapshot starts. */
+    uint8_t *sent;      /**< node_count bytes: the status code last sent of each node. */
+    uint16_t next_node; /**< Where the next snapshot starts. */
     uint8_t sequence;
-    uint32_t tx_dropped;  /**< Trace frames the driver did not take. Saturates. */
+    uint32_t tx_dropped; /**< Trace frames the driver did not take. Saturates. */
 } canopy_trace_state_t;
 
 /** The numbers that go with a tick into the trace. */

@@ -37,13 +37,14 @@ typedef enum {
  * a child's `end` is its next sibling, or the parent's `end` for the last one.
  */
 typedef struct {
-    uint8_t type;       /**< canopy_node_type_t. */
-    uint8_t asks;       /**< Bit i: parameter i is a script that gives the value in each tick. Else 0. */
-    uint16_t parent;    /**< Index of the parent; the root names itself, 0. */
-    uint16_t end;       /**< Index after the last descendant. */
-    uint16_t state;     /**< First of its state words, after those of earlier nodes; any value if it has none. */
-    uint16_t leaf;      /**< Your nodes: index in canopy_tree_t.leaves or .controls. Else 0. */
-    uint16_t parameter; /**< Your nodes: which of the kind's uses this is. Else: first index in canopy_tree_t.parameters. */
+    uint8_t type;    /**< canopy_node_type_t. */
+    uint8_t asks;    /**< Bit i: parameter i is a script that gives the value in each tick. Else 0. */
+    uint16_t parent; /**< Index of the parent; the root names itself, 0. */
+    uint16_t end;    /**< Index after the last descendant. */
+    uint16_t state;  /**< First of its state words, after those of earlier nodes; any value if it has none. */
+    uint16_t leaf;   /**< Your nodes: index in canopy_tree_t.leaves or .controls. Else 0. */
+    uint16_t
+        parameter; /**< Your nodes: which of the kind's uses this is. Else: first index in canopy_tree_t.parameters. */
 } canopy_node_t;
 
 /**
