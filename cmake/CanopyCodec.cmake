@@ -2,10 +2,10 @@
 # canopy_add_codec(NAME DBC bus.dbc [NODE node])
 #
 # Makes the codec of a DBC at build time (`canopy codec`), and the static library NAME of it. Include "STEM_codec.h", where
-# STEM is the DBC file's name in small letters without its ending. docs/codec.md has the rest.
+# STEM is the C name of the DBC file: left_arm of LeftArm.dbc. docs/codec.md has the rest.
 include_guard(GLOBAL)
 
-include(CanopyApplication) # CANOPY_PYTHON, CANOPY_COMPILER_SOURCES
+include("${CMAKE_CURRENT_LIST_DIR}/CanopyApplication.cmake") # CANOPY_PYTHON, CANOPY_COMPILER_SOURCES
 
 function(canopy_add_codec NAME)
   cmake_parse_arguments(PARSE_ARGV 1 CODEC "" "DBC;NODE" "")
@@ -14,7 +14,7 @@ function(canopy_add_codec NAME)
   endif()
   cmake_path(ABSOLUTE_PATH CODEC_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(GET CODEC_DBC STEM stem)
-  string(TOLOWER "${stem}" stem)
+  canopy_c_name("${stem}" stem)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
   set(options "")
   if(CODEC_NODE)
