@@ -7,7 +7,6 @@
  * Each child is a StatefulAction, and in further walks a Condition, in every mixture; a Condition is never RUNNING, so such
  * a walk leaves out the rows in which it would be.
  */
-#include <stdlib.h>
 #include <string.h>
 
 #include "canopy/tree.h"
@@ -114,24 +113,66 @@ static canopy_status_t status_of(char letter)
     }
 }
 
+/** Length of the word that begins here. Text is read with what a target without a C library has, too. */
+static size_t word_length(const char *text)
+{
+    size_t length = 0;
+
+    while (text[length] != '\0' && text[length] != ' ') {
+        length++;
+    }
+    return length;
+}
+
+/** Reads a whole number, after blanks. @return what follows it */
+static const char *read_number(const char *text, int32_t *number)
+{
+    bool negative = false;
+
+    while (*text == ' ') {
+        text++;
+    }
+    if (*text == '-') {
+        negative = true;
+        text++;
+    }
+    *number = 0;
+    while (*text >= '0' && *text <= '9') {
+        *number = (*number * 10) + (*text - '0');
+        text++;
+    }
+    if (negative) {
+        *number = -*number;
+    }
+    return text;
+}
+
+/** Is the word of this length the name? */
+static bool is_name(const char *name, const char *word, size_t length)
+{
+    return strlen(name) == length && memcmp(name, word, length) == 0;
+}
+
 /** "@ name children parameters...": the tree of it. */
 static void read_node(const char *line)
 {
     const char *name = line + 2;
-    size_t length = strcspn(name, " ");
-    char *rest;
+    size_t length = word_length(name);
+    const char *rest;
+    int32_t number;
     unsigned type = 0;
 
-    while (type < CANOPY_NODE_TYPES && (strncmp(names[type], name, length) != 0 || names[type][length] != '\0')) {
+    while (type < CANOPY_NODE_TYPES && !is_name(names[type], name, length)) {
         type++;
     }
     TEST_ASSERT_LESS_THAN_MESSAGE(CANOPY_NODE_TYPES, type, line);
-    children = (unsigned)strtoul(name + length, &rest, 10);
+    rest = read_number(name + length, &number);
+    children = (unsigned)number;
     TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(CHILDREN_MAX, children, line);
     memset(parameters, 0, sizeof parameters);
     for (unsigned which = 0; *rest != '\0'; which++) {
         TEST_ASSERT_LESS_THAN_MESSAGE(PARAMETERS_MAX, which, line);
-        parameters[which] = (int32_t)strtol(rest, &rest, 10);
+        rest = read_number(rest, &parameters[which]);
     }
     nodes[0] = (canopy_node_t){.type = (uint8_t)type, .end = (uint16_t)(children + 1u)};
     for (unsigned child = 1; child <= children; child++) {
@@ -153,26 +194,28 @@ static void read_node(const char *line)
 /** "state | children return | node returns | calls | next state". @return the state. */
 static unsigned read_row(const char *line, row_t *row)
 {
-    char *field;
-    unsigned state = (unsigned)strtoul(line, &field, 10);
+    int32_t state;
+    int32_t next;
+    const char *field = read_number(line, &state);
     size_t length;
 
     field += strlen(" | ");
     row->text = line;
     row->operation = *field == 'h' || *field == 'r' ? *field : 't';
-    length = strcspn(field, " ");
+    length = word_length(field);
     for (unsigned child = 0; child < children; child++) {
         row->returns[child] = row->operation == 't' ? status_of(field[child]) : CANOPY_IDLE;
     }
     field += length + strlen(" | ");
     row->status = status_of(*field);
     field += strlen("R | ");
-    length = strcspn(field, " ");
+    length = word_length(field);
     TEST_ASSERT_LESS_THAN_MESSAGE(CALLS_MAX, length, line);
     memcpy(row->calls, field, length);
     row->calls[*field == '-' ? 0u : length] = '\0';
-    row->next = (unsigned)strtoul(field + length + strlen(" | "), NULL, 10);
-    return state;
+    (void)read_number(field + length + strlen(" | "), &next);
+    row->next = (unsigned)next;
+    return (unsigned)state;
 }
 
 /** A Condition cannot do what the row asks of it. */
@@ -351,10 +394,9 @@ static void the_table_is_complete(void)
         bool found = elsewhere[type] || is_leaf[type];
 
         for (size_t line = 0; line < TABLE_ROWS && !found; line++) {
-            size_t length = strlen(names[type]);
+            const char *name = table[line] + 2;
 
-            found = table[line][0] == '@' && strncmp(table[line] + 2, names[type], length) == 0 &&
-                    table[line][2u + length] == ' ';
+            found = table[line][0] == '@' && is_name(names[type], name, word_length(name));
         }
         TEST_ASSERT_TRUE_MESSAGE(found, names[type]);
     }
