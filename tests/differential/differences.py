@@ -326,7 +326,8 @@ def shown_alike(tree: Tree, ours: Outcome, theirs: Outcome) -> bool:
     """Whether the engine and BehaviorTree.CPP show the same statuses after a tick, but for how it shows them.
 
     The differences that only are shown: it resets a completed root; it does not store SKIPPED; a reactive node resets
-    what it has ticked before the RUNNING child; a SequenceWithMemory that fails does not reset the children before; a two-child IfThenElse does not reset its condition after a FAILURE.
+    what it has ticked before the RUNNING child; a SequenceWithMemory that fails does not reset the children before; a
+    two-child IfThenElse does not reset its condition after a FAILURE.
     """
     parents: list[Spec | None] = []
     specs: list[Spec] = []

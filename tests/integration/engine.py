@@ -11,20 +11,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from canopy.compiler.table import make_table
-from canopy.compiler.tree_reader import Node, Tree
+from canopy.compiler.tree import Node, Script, Tree
 
 RUNTIME = Path(__file__).parents[2] / "runtime"
 IDLE, RUNNING, SUCCESS, FAILURE, SKIPPED = range(5)
 NAMES = ("IDLE", "RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
 
 _TICK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint16)
+_SCRIPT = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
 _HALTED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint16)
 
 
 class _Node(ctypes.Structure):
     _fields_ = (
         ("type", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8),
+        ("asks", ctypes.c_uint8),
         *((name, ctypes.c_uint16) for name in ("parent", "end", "state", "leaf", "parameter")),
     )
 
@@ -38,7 +39,7 @@ class _Tree(ctypes.Structure):
         ("nodes", ctypes.POINTER(_Node)),
         ("leaves", ctypes.POINTER(_Leaf)),
         ("controls", ctypes.c_void_p),
-        ("scripts", ctypes.c_void_p),
+        ("scripts", ctypes.POINTER(_SCRIPT)),
         ("parameters", ctypes.POINTER(ctypes.c_int32)),
         *((f"{name}_count", ctypes.c_uint16) for name in ("node", "leaf", "control", "script", "parameter", "word")),
     )
@@ -63,22 +64,35 @@ def build(folder: Path) -> ctypes.CDLL:
 
 
 class Engine:
-    """A tree whose leaf nodes return what `answer(index)` says; `calls` has each call as (node's index, what)."""
+    """A tree whose leaf nodes return what `answer(index)` says; `calls` has each call as (node's index, what).
 
-    def __init__(self, library: ctypes.CDLL, tree: Tree, answer: Callable[[int], int]) -> None:
+    `ask` gives the value of a script, an entry that is a parameter included.
+    """
+
+    def __init__(
+        self,
+        library: ctypes.CDLL,
+        tree: Tree,
+        answer: Callable[[int], int],
+        ask: Callable[[Script], int] = lambda _script: 0,
+    ) -> None:
         self.calls: list[tuple[int, str]] = []
         self._answer = answer
         self._library = library
+        for index, script in enumerate(tree.scripts):
+            script.body = (f"return {index};",)  # not compiled, but told apart
         table = make_table(tree)
         self.nodes = [row.node for row in table.rows]
         self._index = {id(node): index for index, node in enumerate(self.nodes)}
         self._nodes = (_Node * len(table.rows))(
-            *(_Node(r.node.type.number, 0, r.parent, r.end, r.state, r.leaf, r.parameter) for r in table.rows)
+            *(_Node(r.node.type.number, r.asks, r.parent, r.end, r.state, r.leaf, r.parameter) for r in table.rows)
         )
         self._leaves = (_Leaf * max(1, len(table.leaves)))(*(self._leaf(use.nodes) for use in table.leaves))
         self._parameters = (ctypes.c_int32 * max(1, len(table.parameters)))(*table.parameters)
-        counts = (len(table.rows), len(table.leaves), 0, 0, len(table.parameters), table.words)
-        self._tree = _Tree(self._nodes, self._leaves, None, None, self._parameters, *counts)
+        scripts = (_SCRIPT(lambda _application, script=script: ask(script)) for script in table.scripts)
+        self._scripts = (_SCRIPT * max(1, len(table.scripts)))(*scripts)
+        counts = (len(table.rows), len(table.leaves), 0, len(table.scripts), len(table.parameters), table.words)
+        self._tree = _Tree(self._nodes, self._leaves, None, self._scripts, self._parameters, *counts)
         self._status = (ctypes.c_uint8 * len(table.rows))()
         self._words = (ctypes.c_uint16 * max(1, table.words))()
         self._self = _Instance()

@@ -107,6 +107,10 @@ CASES = [
      "<RetryUntilSuccessful num_attempts='-1'><Go/></RetryUntilSuccessful>"),
     ("unbounded-retry", "<Repeat num_cycles='-1'><Ready/></Repeat>", "has no end",
      "<Timeout msec='9'><Repeat num_cycles='-1'><Ready/></Repeat></Timeout>"),
+    ("unbounded-retry", "<Repeat num_cycles='-1'><Ready/></Repeat>", "has no end",
+     "<Repeat num_cycles='{cycles}'><Ready/></Repeat>"),
+    ("unreachable-child", "<Repeat num_cycles='0'><Go/></Repeat>", "its parent never ticks its child",
+     "<Repeat num_cycles='{cycles}'><Go/></Repeat>"),
     ("hidden-failure", "<ForceSuccess><Go/></ForceSuccess>", "hides that <Go> can fail",
      "<ForceSuccess><Stop/></ForceSuccess>"),
     ("hidden-failure", "<Fallback><Go/><AlwaysSuccess/></Fallback>", "all other children",
@@ -142,6 +146,35 @@ def test_a_rule_fires_where_it_should_and_nowhere_else(
 
 def test_every_rule_has_a_case() -> None:
     assert {case[0] for case in CASES} | {"condition-writes"} == set(all_rules())
+
+
+def test_a_tree_of_every_construct_with_the_compilers_options_about_types() -> None:
+    language = REPOSITORY / "tests" / "unit" / "language"
+    arguments = [language / "main.xml", "--dbc", language / "language.dbc", "--node", "Controller"]
+    without = run(*arguments)
+    assert without.exit_code == 2
+    assert "name its header with --include" in without.output
+    assert run(language / "main.xml", "--include", "state.h").exit_code == 0
+    result = run(*arguments, "--include", "state.h")
+    assert result.exit_code == 0
+    assert result.output.endswith("2 notes\n")
+
+
+def test_floating_point_and_types_of_the_users_own(tmp_path: Path) -> None:
+    file = write(tmp_path, "<Script code='x := 0.5'/>")
+    assert run(file).exit_code == 0, "without a bus, scripts are not compiled"
+    bus = ["--dbc", NAO / "nao.dbc", "--node", "Controller"]
+    assert run(file, *bus).exit_code == 2
+    assert run(file, *bus, "--allow-floating-point").exit_code == 0
+    typed = file.read_text().replace(
+        '<Action ID="Go"/>', "<Action ID=\"Go\"><input_port name='p' type='ns::P'/></Action>"
+    )
+    file.write_text(typed)
+    assert run(file).exit_code == 2
+    assert run(file, "--type-map", "ns::P=p_t", "--include", "p.h").exit_code == 0
+    wrong = run(file, "--type-map", "ns::P")
+    assert wrong.exit_code == 2
+    assert "is not CXX=C" in wrong.output
 
 
 @pytest.mark.parametrize(

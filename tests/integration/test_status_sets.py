@@ -12,6 +12,7 @@ import pytest
 from canopy.check import status_sets
 from canopy.check.facts import Facts
 from canopy.compiler.node_types import node_types
+from canopy.compiler.tree import Script
 from canopy.compiler.tree_reader import Node, built_in_types, read_tree
 from integration import engine
 
@@ -38,7 +39,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 def random_tree(dice: random.Random, depth: int) -> str:
-    """XML of a tree of built-in nodes with up to four children each."""
+    """XML of a tree of built-in nodes with up to four children each; some take their parameters from entries."""
     if depth == 0 or dice.random() < 0.2:
         return dice.choice(
             [f"<{name}/>" for name in (*LEAVES, "AlwaysSuccess", "AlwaysFailure")] + ["<Sleep msec='3'/>"]
@@ -53,6 +54,8 @@ def random_tree(dice: random.Random, depth: int) -> str:
             "max_failures": dice.choice([*range(1, count + 1), -1]),
             "then_skip": dice.choice(["true", "false"]),
         }.get(parameter.name, dice.randint(0, 3))
+        if dice.random() < 0.2:
+            value = "{n}"
         attributes += f" {parameter.name}='{value}'"
     children = "".join(random_tree(dice, depth - 1) for _ in range(count))
     return f"<{kind.name}{attributes}>{children}</{kind.name}>"
@@ -78,7 +81,10 @@ def test_no_random_tree_does_what_the_sets_exclude(tmp_path: Path, library: ctyp
         def answer(index: int, facts: Facts = facts) -> int:
             return engine.NAMES.index(dice.choice(sorted(facts.statuses(facts.nodes[index]))))
 
-        running = engine.Engine(library, tree, answer)
+        def ask(script: Script) -> int:
+            return dice.randint(max(script.least, -6), 6)
+
+        running = engine.Engine(library, tree, answer, ask)
         assert all(one is other for one, other in zip(running.nodes, facts.nodes, strict=True))
         for tick in range(TICKS):
             root = engine.NAMES[running.tick(tick * 1000)]
@@ -110,6 +116,21 @@ def test_the_sets_are_sharp_where_rules_need_them(tmp_path: Path) -> None:
         "<KeepRunningUntilFailure><Yes/></KeepRunningUntilFailure>": "RUNNING",
         "<Timeout msec='5'><Yes/></Timeout>": "SUCCESS",
         "<Sequence><Skips/><Skips/></Sequence>": "SKIPPED",
+        # What an entry gives in each tick may be anything.
+        "<Repeat num_cycles='3'><Busy/></Repeat>": "RUNNING",
+        "<Repeat num_cycles='{n}'><Busy/></Repeat>": "RUNNING SUCCESS",
+        "<RetryUntilSuccessful num_attempts='{n}'><Asks/></RetryUntilSuccessful>": "FAILURE RUNNING SUCCESS",
+        "<Parallel success_count='{n}'><Yes/><Yes/></Parallel>": "FAILURE SUCCESS",
+        "<ParallelAll max_failures='{n}'><Yes/><Busy/></ParallelAll>": "RUNNING",
+        "<ParallelAll max_failures='{n}'><Yes/><No/></ParallelAll>": "FAILURE SUCCESS",
+        "<ReactiveParallel success_count='{n}'><Yes/><Busy/></ReactiveParallel>": "FAILURE RUNNING SUCCESS",
+        "<Delay delay_msec='{n}'><Yes/></Delay>": "RUNNING SUCCESS",
+        "<Delay delay_msec='0'><Yes/></Delay>": "SUCCESS",
+        "<RunOnce then_skip='{n}'><Yes/></RunOnce>": "SKIPPED SUCCESS",
+        "<Precondition if='n == 1' else='SKIPPED'><Yes/></Precondition>": "SKIPPED SUCCESS",
+        "<Yes _skipIf='n == 1'/>": "SKIPPED SUCCESS",
+        "<LoopInt queue='1;2' value='{n}' if_empty='FAILURE'><Yes/></LoopInt>": "FAILURE RUNNING",
+        "<Switch2 variable='{n}' case_1='1' case_2='2'><Yes/><No/><Busy/></Switch2>": "FAILURE RUNNING SUCCESS",
     }
     for nodes, expected in cases.items():
         file = tmp_path / "tree.xml"

@@ -56,7 +56,7 @@ static void what_is_refused_changes_nothing(void)
         TEST_ASSERT_EQUAL(CANOPY_CODEC_OUT_OF_RANGE, gripper_parameter_decode(&parameter, refused[row], 8));
     }
     TEST_ASSERT_EQUAL(CANOPY_CODEC_WRONG_LENGTH, gripper_parameter_decode(&parameter, refused[0], 7));
-    TEST_ASSERT_EQUAL(0, memcmp(&before, &parameter, sizeof before));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &parameter, sizeof before);
 }
 
 static void minus_zero_is_zero(void)

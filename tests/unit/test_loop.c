@@ -127,7 +127,7 @@ void setUp(void)
 {
     fake_can_reset();
     nodes[0] = (canopy_node_t){.type = CANOPY_NODE_REACTIVE_FALLBACK, .end = NODES};
-    for (uint16_t node = 1; node < NODES; node++) {
+    for (uint16_t node = 1; node < (uint16_t)NODES; node++) {
         nodes[node] = (canopy_node_t){.type = CANOPY_NODE_CONDITION, .end = (uint16_t)(node + 1u), .parameter = node};
         returns[node] = CANOPY_FAILURE;
     }

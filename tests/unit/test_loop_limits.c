@@ -217,7 +217,7 @@ static void a_cycle_that_ends_when_the_one_after_the_next_is_due_leaves_out_one(
 {
     cycles_left = 1;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
-    readings[2] = 2u * PERIOD_US;
+    readings[2] = UINT64_C(2) * PERIOD_US;
     canopy_loop_run(&loop);
     TEST_ASSERT_EQUAL_UINT32(1, loop.overruns);
     TEST_ASSERT_EQUAL_UINT32(1, loop.slips);

@@ -160,7 +160,7 @@ static void parameters_that_mean_nothing_are_refused(void)
     REFUSED(5, (tables.nodes[5].type = CANOPY_NODE_LOOP, tables.parameters[8] = -1));
     REFUSED(8, tables.nodes[8].parameter = 1);
     REFUSED(12, tables.nodes[12].parameter = 11);
-    for (uint8_t type = CANOPY_NODE_SKIP_UNLESS_UPDATED; type <= CANOPY_NODE_WAIT_VALUE_UPDATE; type++) {
+    for (uint8_t type = CANOPY_NODE_SKIP_UNLESS_UPDATED; type <= (uint8_t)CANOPY_NODE_WAIT_VALUE_UPDATE; type++) {
         REFUSED(12, (tables.nodes[12].type = type, tables.nodes[12].parameter = 1));
     }
     REFUSED(13, (tables.nodes[13].type = CANOPY_NODE_WAS_ENTRY_UPDATED, tables.nodes[12].type = CANOPY_NODE_INVERTER,

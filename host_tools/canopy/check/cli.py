@@ -12,6 +12,7 @@ import click
 from canopy.check.output import as_json, as_sarif, print_text
 from canopy.check.registry import Rule, Severity, all_rules, table
 from canopy.check.run import BusOptions, Report, check
+from canopy.compiler.cli import read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest
 
 FOUND = 1
@@ -39,6 +40,7 @@ def _wanted(disable: tuple[str, ...], least: Severity) -> list[Rule]:
 @click.option(
     "--period-ms", default=1, type=click.IntRange(1, 3_600_000), help="Also check the cycle times against it."
 )
+@type_options
 @click.option(
     "--severity",
     type=click.Choice([severity.label for severity in Severity]),
@@ -57,6 +59,9 @@ def command(
     dbc: Path | None,
     node: str | None,
     period_ms: int,
+    include: str | None,
+    floats: bool,
+    type_map: tuple[str, ...],
     severity: str,
     disable: tuple[str, ...],
     strict: bool,
@@ -82,11 +87,16 @@ def command(
         raise click.UsageError("--json or --sarif, not both")
     rules = _wanted(disable, Severity[severity.upper()])
     bus = BusOptions(dbc, node, period_ms) if dbc is not None and node is not None else None
+    try:
+        types = read_type_options(include, floats, type_map)
+    except CompileError as error:
+        click.echo(str(error), err=True)
+        sys.exit(INPUT_ERROR)
     report = Report()
     unreadable = False
     for tree in trees:
         try:
-            one = check(tree, rules, bus)
+            one = check(tree, rules, bus, types)
         except CompileError as error:
             click.echo(str(error), err=True)
             unreadable = True

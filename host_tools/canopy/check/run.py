@@ -18,6 +18,7 @@ from canopy.check.registry import Hit, Rule, all_rules
 from canopy.check.rules.declarations import writing_conditions
 from canopy.compiler.emit import load_application
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.port_types import Options
 from canopy.compiler.tree_reader import Tree, read_tree
 from canopy.compiler.xml_reader import Element
 
@@ -70,10 +71,13 @@ def _finding(rule: Rule, hit: Hit) -> Finding:
     return Finding(rule, hit.place, hit.message, hit.help_text or rule.way_out, hit.node.name if hit.node else None)
 
 
-def _load(path: Path, bus: BusOptions | None) -> Tree:
+def _load(path: Path, bus: BusOptions | None, types: Options) -> Tree:
     if bus is None:
-        return read_tree(path)
-    return load_application("check", path, bus.dbc, bus.node, bus.period_ms, _BITRATE).table.tree
+        return read_tree(path, types)
+    application = load_application(
+        "check", path, bus.dbc, bus.node, bus.period_ms, _BITRATE, types.include, options=types
+    )
+    return application.table.tree
 
 
 def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Finding]:
@@ -90,8 +94,8 @@ def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Fin
     return [_finding(rule, hit) for hit in hits] if rule in rules else []
 
 
-def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None) -> Report:
-    """Asks `rules` about the tree in a file; findings in the order of the file.
+def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, types: Options | None = None) -> Report:
+    """Asks `rules` about the tree in a file; findings in the order of the file. `types`: as for the compiler.
 
     Raises:
         CompileError: the tree or the bus cannot be compiled, or a canopy:allow names no rule.
@@ -99,7 +103,7 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None) -> R
     wanted = list(rules)
     report = Report()
     try:
-        facts = Facts(_load(path, bus))
+        facts = Facts(_load(path, bus, types or Options()))
     except CompileError as error:
         report.findings = _refused(path, wanted, error)
         return report

@@ -8,10 +8,10 @@ leaves do within their declared `returns`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from canopy.compiler.tree_reader import Node
+from canopy.compiler.tree import Node, Script
 
 Statuses = frozenset[str]
 
@@ -46,6 +46,18 @@ Rule = Callable[[Node, Sequence[Statuses]], Outcome]
 
 def _all(statuses: Statuses, children: Sequence[Statuses]) -> Outcome:
     return Outcome(statuses, tuple(True for _ in children))
+
+
+def _values(parameter: int | Script, *ends: int) -> tuple[int, ...]:
+    """A parameter's value; if an entry gives one in each tick, `ends`: they allow between them what any value does."""
+    return ends if isinstance(parameter, Script) else (parameter,)
+
+
+def _either(outcomes: Iterable[Outcome]) -> Outcome:
+    """What at least one of the outcomes, of the same node, allows."""
+    every = list(outcomes)
+    statuses = NONE.union(*(one.statuses for one in every))
+    return Outcome(statuses, tuple(map(any, zip(*(one.ticked for one in every), strict=True))))
 
 
 def _in_order(children: Sequence[Statuses], go_on: str, stop: str) -> Outcome:
@@ -100,15 +112,21 @@ def _completing(
         result.add(F)
     if any(child & {R, K} for child in children):
         result.add(R)
-    if all(K in child for child in children):
+    if children and all(K in child for child in children):
         result.add(K)
     return frozenset(result)
 
 
 def _parallel(node: Node, children: Sequence[Statuses]) -> Outcome:
+    successes, failures = (_values(parameter, 0, len(children) + 1) for parameter in node.parameters)
+    return _either(_parallel_with(s, f, children) for s in successes for f in failures)
+
+
+def _parallel_with(success_count: int, failure_count: int, children: Sequence[Statuses]) -> Outcome:
     count = len(children)
-    needed, failures_needed = (_threshold(value, count) for value in node.parameters)
-    good = frozenset((S, K) if node.parameters[0] < 0 else (S,))
+    needed = _threshold(success_count, count)
+    failures_needed = _threshold(failure_count, count)
+    good = frozenset((S, K) if success_count < 0 else (S,))
     certain = 0
     ticked = []
     for child in children:
@@ -119,7 +137,11 @@ def _parallel(node: Node, children: Sequence[Statuses]) -> Outcome:
 
 
 def _parallel_all(node: Node, children: Sequence[Statuses]) -> Outcome:
-    limit = _threshold(node.parameters[0], len(children))
+    limits = _values(node.parameters[0], 0, len(children) + 1)
+    return _either(_parallel_all_with(_threshold(limit, len(children)), children) for limit in limits)
+
+
+def _parallel_all_with(limit: int, children: Sequence[Statuses]) -> Outcome:
     result = {R} if any(R in child for child in children) else set()
     if all(child & {S, F, K} for child in children):
         if sum(F in child for child in children) >= limit:
@@ -132,8 +154,12 @@ def _parallel_all(node: Node, children: Sequence[Statuses]) -> Outcome:
 
 
 def _reactive_parallel(node: Node, children: Sequence[Statuses]) -> Outcome:
+    needed = _values(node.parameters[0], 1, len(children) + 1)
+    return _either(_reactive_parallel_with(_threshold(least, len(children)), children) for least in needed)
+
+
+def _reactive_parallel_with(needed: int, children: Sequence[Statuses]) -> Outcome:
     count = len(children)
-    needed = _threshold(node.parameters[0], count)
     if any(K in child for child in children):  # N depends on who is skipped: no sharper bound is worth the trouble
         result = {S, F}
         if any(R in child for child in children):
@@ -176,8 +202,7 @@ def _map(**changed: str) -> Rule:
 def _again(repeated: str) -> Rule:
     """Repeat (`repeated` is SUCCESS) and RetryUntilSuccessful (FAILURE)."""
 
-    def rule(node: Node, children: Sequence[Statuses]) -> Outcome:
-        most = node.parameters[0]
+    def times(most: int, children: Sequence[Statuses]) -> Outcome:
         if most == 0:
             return Outcome(frozenset((repeated,)), (False,))
         result = set(children[0])
@@ -186,6 +211,9 @@ def _again(repeated: str) -> Rule:
         if most < 0:
             result.discard(repeated)
         return _all(frozenset(result), children)
+
+    def rule(node: Node, children: Sequence[Statuses]) -> Outcome:
+        return _either(times(most, children) for most in _values(node.parameters[0], 0, 2))
 
     return rule
 
@@ -198,7 +226,7 @@ def _plus(added: str) -> Rule:
 
 
 def _delay(node: Node, children: Sequence[Statuses]) -> Outcome:
-    return _all(children[0] | ({R} if node.parameters[0] > 0 else NONE), children)
+    return _all(children[0] | ({R} if max(_values(node.parameters[0], 1)) > 0 else NONE), children)
 
 
 def _timeout(_node: Node, children: Sequence[Statuses]) -> Outcome:
@@ -206,16 +234,21 @@ def _timeout(_node: Node, children: Sequence[Statuses]) -> Outcome:
 
 
 def _run_once(node: Node, children: Sequence[Statuses]) -> Outcome:
-    return _all(children[0] | ({K} if node.parameters[0] and children[0] & {S, F} else NONE), children)
+    return _all(children[0] | ({K} if any(_values(node.parameters[0], 1)) and children[0] & {S, F} else NONE), children)
+
+
+def _given(status: int | Script) -> Statuses:
+    """The status that a parameter names."""
+    return frozenset(NUMBERS[number] for number in _values(status, *NUMBERS))
 
 
 def _else_status(node: Node, children: Sequence[Statuses]) -> Outcome:
     """Precondition: the child's, or the status given in `else`."""
-    return _all(children[0] | {NUMBERS[node.parameters[1]]}, children)
+    return _all(children[0] | _given(node.parameters[1]), children)
 
 
 def _attributes(node: Node, children: Sequence[Statuses]) -> Outcome:
-    failure_if, success_if, skip_if, while_ = (script >= 0 for script in node.parameters[:4])
+    failure_if, success_if, skip_if, while_ = (script != -1 for script in node.parameters[:4])
     added = {F: failure_if, S: success_if, K: skip_if or while_}
     return _all(children[0] | {status for status, given in added.items() if given}, children)
 
@@ -223,7 +256,7 @@ def _attributes(node: Node, children: Sequence[Statuses]) -> Outcome:
 def _loop(node: Node, children: Sequence[Statuses]) -> Outcome:
     """After each item RUNNING, even after the last; the empty queue is seen in the next tick."""
     going_on = frozenset((R,)) if children[0] & {S, R, K} else NONE
-    return _all(going_on | children[0] & {F} | {NUMBERS[node.parameters[1]]}, children)
+    return _all(going_on | children[0] & {F} | _given(node.parameters[1]), children)
 
 
 def _any_child(_node: Node, children: Sequence[Statuses]) -> Outcome:

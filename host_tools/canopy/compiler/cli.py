@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
@@ -17,6 +19,8 @@ from canopy.compiler.port_types import Options
 from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
+
+_Command = TypeVar("_Command", bound=Callable[..., object])
 
 
 def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int | None) -> None:
@@ -30,14 +34,34 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
 
 
-def _read_type_map(pairs: tuple[str, ...]) -> dict[str, str]:
+def type_options(command: _Command) -> _Command:
+    """The options about types, of every command that reads trees."""
+    for option in (
+        click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
+        click.option(
+            "--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double."
+        ),
+        click.option(
+            "--include", help="Header of yours with the state types of leaves, included by the generated files."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def read_type_options(include: str | None, floats: bool, type_map: tuple[str, ...]) -> Options:
+    """What `type_options` were given.
+
+    Raises:
+        CompileError: a --type-map is malformed.
+    """
     result = {}
-    for pair in pairs:
+    for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
         if not found or not is_c_identifier(c_type.strip()):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
-    return result
+    return Options(floats, result, include)
 
 
 @click.command()
@@ -47,9 +71,7 @@ def _read_type_map(pairs: tuple[str, ...]) -> dict[str, str]:
 @click.option("--period-ms", required=True, type=click.IntRange(1, 3_600_000), help="Time from tick to tick.")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder for the generated files.")
 @click.option("--name", help="Name of the application; the tree file's stem if not given.")
-@click.option("--include", help="Header of yours with the state types of leaves, included by the generated files.")
-@click.option("--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double.")
-@click.option("--type-map", "type_map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type.")
+@type_options
 @click.option("--stubs", "stubs_file", type=click.Path(path_type=Path), help="Write skeletons of what you write.")
 @click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
@@ -83,7 +105,7 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        options = Options(floats, _read_type_map(type_map), include)
+        options = read_type_options(include, floats, type_map)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options)
         files = render(application)
     except CompileError as error:

@@ -14,10 +14,10 @@ FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's o
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 
-Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that the
-leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one cleans up
-after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps a
-condition's threshold from chattering).
+Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that
+the leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one
+cleans up after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps
+a condition's threshold from chattering).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from canopy.compiler.tree_reader import Node
+from canopy.compiler.tree import Node, Script
 
 Shape = Literal["box", "oval", "diamond"]
 
@@ -45,7 +45,8 @@ class Look:
 
 def parameter_text(node: Node) -> str:
     """The parameters as `3` or `success_count=1 failure_count=2`."""
-    named = list(zip((parameter.name for parameter in node.type.parameters), node.parameters, strict=False))
+    values = (value.text if isinstance(value, Script) else value for value in node.parameters)
+    named = list(zip((parameter.name for parameter in node.type.parameters), values, strict=False))
     return str(named[0][1]) if len(named) == 1 else " ".join(f"{name}={value}" for name, value in named)
 
 

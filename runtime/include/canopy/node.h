@@ -51,7 +51,7 @@ static inline bool canopy_goes_on(const canopy_tree_instance_t *self, uint16_t n
 }
 
 /** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. */
-void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t node);
+void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top);
 
 /** The parent resets a child: halted if RUNNING, then IDLE. */
 static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t child)

@@ -25,7 +25,7 @@ def unbounded_retry(facts: Facts) -> Iterator[Hit]:
     """A Timeout directly above (through decorators) bounds it."""
     for node in facts.nodes:
         again = ENDLESS.get(node.type.name)
-        if again is None or node.parameters[0] >= 0:
+        if again is None or node.parameters[0] != -1:  # -1 is the only endless one; an entry's value is not known
             continue
         statuses = facts.statuses(node.children[0])
         above = facts.parent(node)
