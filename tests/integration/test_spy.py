@@ -12,9 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import lcm
 import pytest
 
-import lcm
 from canopy.bridge import status_message, structure_message
 from canopy.model import load_model
 from canopy.spy import find_jar
