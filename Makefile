@@ -79,7 +79,7 @@ coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fail
 	$(SETUP)/make-venv can,lcm,test
 	$(call BUILD,coverage)
 	rm -rf build/coverage/profiles
-	LLVM_PROFILE_FILE=$(CURDIR)/build/coverage/profiles/%m-%p.profraw ctest --preset coverage
+	LLVM_PROFILE_FILE="$(CURDIR)/build/coverage/profiles/%m-%p.profraw" ctest --preset coverage
 	$(PYTHON) tests/coverage/report.py build/coverage runtime
 
 test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed each time
