@@ -34,7 +34,7 @@ canopy_step_t round_robin_enter(canopy_tree_instance_t *tree, uint16_t node, con
 {
     uint16_t child = (uint16_t)(node + 1u);
     uint16_t children = canopy_count_children(tree, node);
-    uint8_t place = (uint8_t)(children > 0u ? (ports->first + self->next) % children : 0u);
+    uint8_t place = (uint8_t)(children > 0u ? (ports->first + self->next) % children : 0);
 
     (void)in;
     for (; place > 0u; place--) {
