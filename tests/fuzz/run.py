@@ -25,7 +25,8 @@ def run(program: Path, kept: Path, seconds: int) -> bool:
     found = program.parent / "found" / program.name
     for folder in (work, found):
         folder.mkdir(parents=True, exist_ok=True)
-    command = [str(program), str(work), str(kept), *OPTIONS, f"-max_total_time={seconds}", f"-artifact_prefix={found}/"]
+    corpora = [str(work), *([str(kept)] if kept.is_dir() else [])]  # a target without regressions has no folder
+    command = [str(program), *corpora, *OPTIONS, f"-max_total_time={seconds}", f"-artifact_prefix={found}/"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     executions = re.search(r"number_of_executed_units: (\d+)", result.stderr)
     coverage = re.findall(r"cov: (\d+)", result.stderr)
