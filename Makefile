@@ -44,7 +44,7 @@ test-python: # Python and integration tests that need no CAN interface
 	$(PYTEST) -m "not rig and not clang"
 
 test-rig: # integration tests on vcan0: one guest for all of them
-	$(PYTHON) tests/rig/with-vcan --timeout 600 --mem 1G -- $(PYTEST) -m rig
+	$(PYTHON) tests/rig/with-vcan --timeout 1800 --mem 1G -- $(PYTEST) -m rig
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from canopy.cli import main
 from canopy.compiler.bus_reader import read_messages
-from integration.codec_harness import ROOT, WARNINGS
+from integration.codec_harness import BARE_LIBC, ROOT, WARNINGS
 from integration.compilers import COMPILERS
 
 FOLDER = Path(__file__).parent / "dbc"
@@ -77,7 +77,7 @@ def test_it_compiles_without_a_warning(dbc: Path, tmp_path: Path, compiler: str)
 def test_on_cortex_m0_it_needs_no_floating_point(dbc: Path, tmp_path: Path) -> None:
     assert make_codec(dbc, tmp_path).exit_code == 0
     source, target = tmp_path / f"{dbc.stem}_codec.c", tmp_path / "out.o"
-    arm = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-Os"]
+    arm = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-Os", f"-I{BARE_LIBC}"]
     subprocess.run([*arm, *WARNINGS, INCLUDE, "-c", source, "-o", target], check=True)
     needed = subprocess.run(["arm-none-eabi-nm", "-u", target], check=True, capture_output=True, text=True).stdout
     names = [line.split()[-1] for line in needed.splitlines() if line.strip()]
