@@ -325,7 +325,13 @@ def _check_node(place: Place, database: Any, node: str) -> None:
 
 
 def _make_bus(
-    path: Path, database: Any, node: str, receive: list[Message], send: list[Message], trace: dict[str, Message]
+    path: Path,
+    database: Any,
+    node: str,
+    receive: list[Message],
+    send: list[Message],
+    trace: dict[str, Message],
+    name: str | None = None,
 ) -> Bus:
     """The bus, with C names, each its own."""
     place = Place(str(path))
@@ -333,7 +339,7 @@ def _make_bus(
     named = {message.name: message for message in name_messages(tuple(known.values()))}
     return Bus(
         path=path,
-        name=snake(path.stem),
+        name=name or snake(path.stem),
         node=node,
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
@@ -345,8 +351,10 @@ def _make_bus(
     )
 
 
-def read_bus(path: Path, node: str, period_ms: int) -> Bus:
+def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> Bus:
     """The bus of a DBC as `node` sees it, for a controller that ticks every `period_ms`.
+
+    `name` is what its C names begin with: the application's, for its tables hold counts of its ticks. Else the file's.
 
     Raises:
         CompileError: the file cannot be read, has no such node, or has something that cannot be compiled.
@@ -368,7 +376,7 @@ def read_bus(path: Path, node: str, period_ms: int) -> Bus:
             receive.append(_read_message(database, place, message))
     for message in receive + send:
         _check_frame(place, message)
-    bus = _make_bus(path, database, node, receive, send, trace)
+    bus = _make_bus(path, database, node, receive, send, trace, name)
     _check_outputs(place, database, bus.send, period_ms)
     return bus
 
