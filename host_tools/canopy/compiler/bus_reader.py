@@ -31,7 +31,7 @@ from canopy.compiler.bus_model import (
 from canopy.compiler.bus_names import name_messages
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import snake
-from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace
+from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace, trace_kind
 
 __all__ = ["TRACE_LAYOUT", "Bus", "Message", "Signal", "read_bus", "read_messages"]
 
@@ -367,9 +367,16 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     send: list[Message] = []
     for message in _by_id(database):
         sent = node in message.senders
-        if message.name in TRACE_LAYOUT and sent:
-            check_trace(place, message)
-            trace[message.name] = _read_message(database, place, message)
+        kind = trace_kind(message.name) if sent else None
+        if kind is not None:
+            check_trace(place, message, kind)
+            if kind in trace:
+                raise CompileError(
+                    place,
+                    f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
+                    "give each node that runs a tree its own",
+                )
+            trace[kind] = _read_message(database, place, message)
         elif sent:
             send.append(_read_message(database, place, message))
         elif any(node in signal.receivers for signal in message.signals):
