@@ -19,8 +19,8 @@ static canopy_status_t guarantee_power_supply(const nao_power_input_t *in, nao_p
     if (in->battery.level >= FULL || (!at_charger && in->battery.level > LOW)) {
         return CANOPY_SUCCESS;
     }
-    nao_power_set_power_command_mode(out,
-                               at_charger ? NAO_POWER_POWER_COMMAND_MODE_CHARGE : NAO_POWER_POWER_COMMAND_MODE_DRIVE_TO_CHARGER);
+    nao_power_set_power_command_mode(out, at_charger ? NAO_POWER_POWER_COMMAND_MODE_CHARGE
+                                                     : NAO_POWER_POWER_COMMAND_MODE_DRIVE_TO_CHARGER);
     return CANOPY_RUNNING;
 }
 
