@@ -95,9 +95,15 @@ def test_the_model_names_the_trace_messages_of_its_node(build_dir: Path) -> None
         assert not any("Canopy" in message for message in data["bus"]["send"] + data["bus"]["receive"])
 
 
-def compile_driver(tmp_path: Path, text: str) -> tuple[int, str]:
+def compile_c(tmp_path: Path, file: str) -> None:
+    include = ["-I", str(Path(__file__).parents[2] / "runtime" / "include"), "-I", str(tmp_path / "out")]
+    command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *include, "-c", "-o", str(tmp_path / "object.o")]
+    subprocess.run([*command, str(tmp_path / "out" / file)], check=True)
+
+
+def compile_driver(tmp_path: Path, text: str, tree: Path = SEVERAL / "driver.xml") -> tuple[int, str]:
     (tmp_path / "rover.dbc").write_text(text)
-    arguments = ["compile", str(SEVERAL / "driver.xml"), "--dbc", str(tmp_path / "rover.dbc"), "--node", "Driver"]
+    arguments = ["compile", str(tree), "--dbc", str(tmp_path / "rover.dbc"), "--node", "Driver"]
     result = CliRunner().invoke(main, [*arguments, "--period-ms", "10", "-o", str(tmp_path / "out")])
     return result.exit_code, result.stderr
 
@@ -139,9 +145,20 @@ def test_names_of_the_bus_do_not_meet_those_of_the_application(tmp_path: Path) -
     text = DBC.read_text().replace("BO_ 256 Wheels", message)
     code, errors = compile_driver(tmp_path, text)
     assert code == 0, errors
-    include = ["-I", str(Path(__file__).parents[2] / "runtime" / "include"), "-I", str(tmp_path / "out")]
-    command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *include, "-c", "-o", str(tmp_path / "app.o")]
-    subprocess.run([*command, str(tmp_path / "out" / "driver_app.c")], check=True)
+    compile_c(tmp_path, "driver_app.c")
+
+
+def test_a_message_may_have_the_name_of_a_leafs_function(tmp_path: Path) -> None:
+    """The leaf IsSafe is is_safe_tick() in C, and the message IsSafeTick the member is_safe_tick."""
+    (tmp_path / "driver.xml").write_text((SEVERAL / "driver.xml").read_text().replace("Wheels", "IsSafeTick"))
+    code, errors = compile_driver(
+        tmp_path, DBC.read_text().replace(" Wheels:", " IsSafeTick:"), tmp_path / "driver.xml"
+    )
+    assert code == 0, errors
+    leaves = (SEVERAL / "driver_leaves.c").read_text()
+    (tmp_path / "out" / "leaves.c").write_text(leaves.replace("in->wheels.", "in->is_safe_tick."))
+    for file in ("driver_app.c", "driver_bus.c", "leaves.c"):
+        compile_c(tmp_path, file)
 
 
 def test_a_second_tree_can_be_monitored(build_dir: Path, bus_dir: Path, helper: Callable[[str], Path]) -> None:

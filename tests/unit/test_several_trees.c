@@ -9,7 +9,8 @@
 #include "navigator_app.h"
 #include "unity.h"
 
-enum { QUEUE = 16, RUN_MS = 1200, MS = 1000, ECHO_ID = 0x211, WAS = 8 };
+enum { QUEUE = 16, RUN_MS = 1200, ECHO_ID = 0x211, WAS = 8 };
+#define MS UINT64_C(1000)
 
 /** What has gone to the wire with one id, before the end. */
 typedef struct {
@@ -62,7 +63,7 @@ static int controller_send(void *context, const canopy_can_frame_t *frame)
     }
     for (unsigned kind = 0; kind < (unsigned)KINDS; kind++) {
         if (sent[kind].id == frame->id) {
-            if (sent[kind].count > 0u && time_now - sent[kind].last != (canopy_time_t)sent[kind].interval_ms * MS) {
+            if (sent[kind].count > 0u && time_now - sent[kind].last != sent[kind].interval_ms * MS) {
                 off_beat++;
             }
             sent[kind].count++;
@@ -87,7 +88,7 @@ static canopy_time_t now(void *context)
 static bool wait_until(void *context, canopy_time_t deadline)
 {
     (void)context;
-    ended = deadline >= (canopy_time_t)RUN_MS * MS;
+    ended = deadline >= RUN_MS * MS;
     if (!ended) {
         TEST_ASSERT_TRUE(deadline >= time_now);
         time_now = deadline;
