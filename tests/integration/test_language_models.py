@@ -44,6 +44,9 @@ def test_stubs_compile_and_are_never_overwritten(tmp_path: Path) -> None:
         ("std::vector&amp;lt;int&amp;gt;", "const list_t *"),
         ("double", "double"),
         ("pose_t", "const pose_t *"),
+        ("int16_t*0.01", "int16_t"),
+        ("unsigned char / 4", "uint8_t"),
+        ("my::Celsius", "int32_t"),
     ],
 )
 def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
@@ -53,6 +56,8 @@ def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
         "nav_msgs::msg::Path=path_t",
         "--type-map",
         "std::vector<int>=list_t",
+        "--type-map",
+        "my::Celsius=int32_t*0.1",
         "--include",
         "mine.h",
     ]

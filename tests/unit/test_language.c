@@ -125,6 +125,26 @@ static void signals_are_compared_in_physical_units(void)
     TEST_ASSERT_EQUAL_UINT16(100, language_output->fan.speed);
 }
 
+static void fixed_point_is_counted_in_steps(void)
+{
+    /* 10.5 degC: Scale sees its literal in quarters, the signal in tenths, and hands on the gain, -1.25 + 0.25. */
+    cycle_with(1, 2);
+    TEST_ASSERT_EQUAL_INT16(-100, language_entries->scaled);
+    TEST_ASSERT_EQUAL_INT16(-100, language_entries->scaled_copy);
+    TEST_ASSERT_EQUAL_INT8(-101, language_entries->trimmed);
+    TEST_ASSERT_EQUAL_INT16(50, language_entries->gain);
+    TEST_ASSERT_EQUAL_INT32(50, language_entries->whole);
+    TEST_ASSERT_EQUAL_UINT16(50, language_output->fan.ticks);
+    TEST_ASSERT_EQUAL_UINT32(0, language_entries->script_faults);
+    /* What does not fit is limited, and counted: 10 * 327.67 - 0.1 in steps of 0.1 is above 12.7. */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    language_entries->gain = INT16_MAX;
+    cycle();
+    TEST_ASSERT_EQUAL_INT16(INT16_MAX, language_entries->gain);
+    TEST_ASSERT_EQUAL_INT8(INT8_MAX, language_entries->trimmed);
+    TEST_ASSERT_EQUAL_UINT32(2, language_entries->script_faults);
+}
+
 static void scripts_that_read_stale_signals_are_false(void)
 {
     cycle();
@@ -220,6 +240,7 @@ int main(void)
     RUN_TEST(the_programs_own_entries_begin_with_their_defaults);
     RUN_TEST(parameters_of_built_in_nodes_may_be_entries);
     RUN_TEST(signals_are_compared_in_physical_units);
+    RUN_TEST(fixed_point_is_counted_in_steps);
     RUN_TEST(scripts_that_read_stale_signals_are_false);
     RUN_TEST(a_switch_takes_the_case_that_matches);
     RUN_TEST(texts_are_places_in_a_table);

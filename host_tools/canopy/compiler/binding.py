@@ -10,7 +10,8 @@ from canopy.compiler.bus_reader import Bus
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.port_types import ANY, BOOL, DOUBLE, INT32, INT64, TEXT, Options, PortType, literal
-from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess, stripped
+from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess
+from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, Name, Number, ScriptError, parse, parts
 from canopy.compiler.script.values import Const, Double, Num, TextConst, Value
 from canopy.compiler.script_bodies import Bodies, entry_value
@@ -199,7 +200,8 @@ class _Binder:
             raise CompileError(
                 place,
                 f"entry '{entry.name}' would hold fractions, and no port says its type",
-                "count in a smaller unit (whole numbers), or compile with --allow-floating-point",
+                f'declare it in fixed point, as a port of its tree: <inout_port name="{entry.name}" '
+                'type="int32_t*0.01"/>; or count in a smaller unit; or compile with --allow-floating-point',
             )
         return TEXT
 
@@ -292,7 +294,7 @@ class _Binder:
         if isinstance(bound.target, SignalName):
             compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
             try:
-                c = compiler.convert(compiler.signal(bound.target.text, 0), port.type, 0)
+                c = compiler.storing.convert(compiler.signal(bound.target.text, 0), port.type, 0)
             except ScriptError as error:
                 raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
             return BoundPort(_zero(port.type), stripped(c))

@@ -15,7 +15,7 @@ from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render, write_files
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
-from canopy.compiler.port_types import Options
+from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
@@ -58,7 +58,7 @@ def read_type_options(include: str | None, floats: bool, type_map: tuple[str, ..
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not is_c_identifier(c_type.strip()):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
     return Options(floats, result, include)

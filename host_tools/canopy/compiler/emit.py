@@ -18,7 +18,16 @@ from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_c import arguments, entry_type, parameters, port_members, prototypes, setters, stale_test
+from canopy.compiler.leaf_c import (
+    arguments,
+    entry_note,
+    entry_type,
+    parameters,
+    port_members,
+    prototypes,
+    setters,
+    stale_test,
+)
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
 from canopy.compiler.script.compile import Texts
@@ -192,6 +201,7 @@ def environment(bus: Bus) -> jinja2.Environment:
         "port_members": port_members,
         "setters": setters,
         "entry_type": entry_type,
+        "entry_note": entry_note,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }

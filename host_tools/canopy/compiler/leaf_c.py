@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
+from canopy.compiler.errors import plain
 from canopy.compiler.leaf_model import Leaf, Port
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
@@ -78,6 +79,8 @@ def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[
     notes = [port.description] if port.description else []
     if port.type.kind == "duration":
         notes.insert(0, "[ms]")
+    if port.type.kind == "fixed":
+        notes.insert(0, f"In steps of {plain(port.type.scale)}.")
     if not port.writes:
         c_type = f"const {port.type.c} *" if port.type.kind == "user" else port.type.c
         return [(f"{_spaced(c_type)}{port.c_name};", " ".join(notes))]
@@ -117,3 +120,10 @@ def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
 def entry_type(entry: Entry) -> str:
     """The C type of an entry's member. Texts are places in the table of texts."""
     return "uint16_t" if entry.type.kind == "text" else entry.type.c
+
+
+def entry_note(entry: Entry) -> str:
+    """What a reader of the entry's member must know of its type."""
+    if entry.type.kind == "fixed":
+        return f"; in steps of {plain(entry.type.scale)}"
+    return "; place in the table of texts" if entry.type.kind == "text" else ""

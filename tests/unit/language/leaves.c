@@ -9,6 +9,14 @@ canopy_status_t find_goal_tick(const language_input_t *in, const find_goal_ports
     return CANOPY_SUCCESS;
 }
 
+/* Every port is a whole number of steps: 12.75 in quarters, degrees in tenths. */
+canopy_status_t scale_tick(const language_input_t *in, const scale_ports_t *ports)
+{
+    (void)in;
+    scale_set_scaled(ports, ports->gain);
+    return ports->most == 51u && ports->temperature == 105 ? CANOPY_SUCCESS : CANOPY_FAILURE;
+}
+
 canopy_status_t fill_queue_tick(const language_input_t *in, const fill_queue_ports_t *ports)
 {
     static const canopy_queue_int32_3_t queue = {.count = 3, .items = {5, 70, 900}};

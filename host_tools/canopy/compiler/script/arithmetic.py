@@ -11,10 +11,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
-from canopy.compiler.errors import nearest
+from canopy.compiler.errors import nearest, plain
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import (
-    INT32,
     INT64,
     Const,
     Double,
@@ -27,7 +26,6 @@ from canopy.compiler.script.values import (
     describe,
     literal,
     number,
-    plain,
     result,
 )
 
@@ -233,7 +231,9 @@ class Arithmetic:
             ends = (one.high, two.high)
             low, high = 0, min(ends) if sign == "&" else 2 ** max(end.bit_length() for end in ends) - 1
         else:
-            low, high = INT64 if wide else INT32
+            # The fewest bits that hold both sides: C compilers warn of comparisons that these already decide.
+            bits = max((~end if end < 0 else end).bit_length() for end in (one.low, one.high, two.low, two.high))
+            low, high = -(2**bits), 2**bits - 1
         c = f"({one.as_type(wide)} {sign} {two.as_type(wide)})"
         return Num(c, "int64_t" if wide else "int32_t", low, high)
 

@@ -8,10 +8,11 @@ from fractions import Fraction
 from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
 from canopy.compiler.codec import value_type
-from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.errors import CompileError, Place, nearest, plain
 from canopy.compiler.names import snake
 from canopy.compiler.port_types import PortType
 from canopy.compiler.script.arithmetic import Arithmetic
+from canopy.compiler.script.storing import Storing, stripped
 from canopy.compiler.script.syntax import (
     Assignment,
     Binary,
@@ -35,8 +36,6 @@ from canopy.compiler.script.values import (
     boolean,
     common_scale,
     describe,
-    number,
-    plain,
 )
 
 FAULTS = "&app->entries.script_faults"
@@ -81,6 +80,7 @@ class Compiler:
         self._bus = bus
         self._texts = texts
         self._arithmetic = Arithmetic(floats, FAULTS, texts.index)
+        self.storing = Storing(self._arithmetic, FAULTS)
         self.used: dict[str, Message] = {}
         self.tested: set[str] = set()
         self.parts: set[str] = set()
@@ -177,8 +177,8 @@ class Compiler:
         if kind.kind == "float":
             return Double(c if kind.c == "double" else f"(double){c}")
         if kind.high > INT64[1]:
-            return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1])
-        return Num(c, kind.c, kind.low, kind.high, is_bool=kind.kind == "bool")
+            return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1], kind.scale)
+        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool")
 
     def _message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
         for message in messages:
@@ -244,54 +244,7 @@ class Compiler:
         """A comparison of values that are no expressions: a Switch's cases."""
         return self._arithmetic.compare(sign, left, right, 0)
 
-    # Storing
-
-    def parameter(self, value: Value, least: int) -> str:
-        """The C expression of a node's parameter: 32 bits, and not below `least`."""
-        if isinstance(value, Num) and value.is_bool:
-            return f"(int32_t){value.c}"
-        return self.convert(value, PortType("int", "int32_t", least, 2**31 - 1), 0)
-
-    def convert(self, value: Value, kind: PortType, index: int) -> str:
-        """The C expression that stores a value in an entry or port of a type."""
-        if kind.kind == "text":
-            if isinstance(value, (TextConst, TextVar)):
-                return self._arithmetic.text(value)
-            raise ScriptError(index, f"{describe(value)} cannot be stored as a text", "write it in '…'")
-        if isinstance(value, (TextConst, TextVar)) or kind.kind == "user":
-            raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
-        if kind.kind == "float":
-            c = self._arithmetic.double(value, index)
-            return c if kind.c == "double" else f"(float)({c})"
-        if kind.kind == "bool":
-            truth = self._arithmetic.truth(value, index)
-            return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
-        if isinstance(value, Double):
-            return f"({kind.c})canopy_whole({value.c}, {_limits(kind)}, {FAULTS})"
-        return self._whole(value, kind, index)
-
-    def _whole(self, value: Num | Const, kind: PortType, index: int) -> str:
-        if isinstance(value, Const):
-            if value.value.denominator != 1:
-                raise ScriptError(index, f"{plain(value.value)} is no whole number, and {kind} is wanted")
-            if not kind.low <= value.value <= kind.high:
-                raise ScriptError(index, f"{plain(value.value)} is outside {kind.c} [{kind.low}, {kind.high}]")
-            bits = kind.c.strip("uint_")
-            sign = "U" if kind.low == 0 else ""
-            whole = int(value.value)
-            if whole == kind.low and whole < 0:
-                return f"(INT{bits}_C({whole + 1}) - 1)"
-            return f"{sign}INT{bits}_C({whole})"
-        if value.scale.denominator != 1:
-            raise ScriptError(
-                index,
-                f"{describe(value)} would lose precision as {kind}",
-                f"multiply it by {value.scale.denominator}, and count in that unit",
-            )
-        whole_value = self._arithmetic.scaled(value, Fraction(1), index)
-        if kind.low <= whole_value.low and whole_value.high <= kind.high:
-            return whole_value.c if whole_value.c_type == kind.c else f"({kind.c}){whole_value.c}"
-        return f"({kind.c})canopy_limit({stripped(whole_value.as_type(True))}, {_limits(kind)}, {FAULTS})"
+    # Statements
 
     def statement(self, expression: Expression) -> list[str]:
         """C lines of a statement; none for one that only computes."""
@@ -308,7 +261,7 @@ class Compiler:
             )
         if target.type.kind == "any":
             raise UntypedError(target.name)
-        return self.store(target, self.convert(value, target.type, expression.value.index))
+        return self.store(target, self.storing.convert(value, target.type, expression.value.index))
 
     @staticmethod
     def store(target: Entry, c: str) -> list[str]:
@@ -344,7 +297,7 @@ class Compiler:
             if not isinstance(value, (Num, Const)):
                 raise ScriptError(index, f"{describe(value)} is no value of '{text}'")
             wide = PortType("int", "int32_t", -(2**31), 2**31 - 1)
-            return f"({enum}_t)({self._whole(value, wide, index)})"
+            return f"({enum}_t)({self.storing.whole(value, wide, index)})"
         if signal.is_bool:
             truth = self._arithmetic.truth(value, index)
             return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
@@ -375,25 +328,4 @@ class Compiler:
             )
         c_type = value_type(signal)
         low, high = {"int32_t": (-(2**31), 2**31 - 1), "int64_t": INT64, "uint64_t": (0, 2**64 - 1)}[c_type]
-        return self._whole(raw, PortType("int", c_type, low, high), index)
-
-
-def _limits(kind: PortType) -> str:
-    """The limits of a type as C names where it has such."""
-    bits = kind.c.strip("uint_")
-    low = "0" if kind.low == 0 else f"INT{bits}_MIN" if kind.low == -(2 ** (int(bits) - 1)) else number(kind.low, True)
-    if kind.high > INT64[1]:
-        return f"{low}, INT64_MAX"
-    return f"{low}, {'U' if kind.high == 2 ** int(bits) - 1 else ''}INT{bits}_MAX"
-
-
-def stripped(c: str) -> str:
-    """Without the parentheses around the whole."""
-    if not (c.startswith("(") and c.endswith(")")):
-        return c
-    depth = 0
-    for place, character in enumerate(c):
-        depth += {"(": 1, ")": -1}.get(character, 0)
-        if depth == 0 and place != len(c) - 1:
-            return c
-    return c[1:-1]
+        return self.storing.whole(raw, PortType("int", c_type, low, high), index)
