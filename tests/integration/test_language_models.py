@@ -78,6 +78,28 @@ def test_floating_point_only_where_it_is_allowed(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "main_app.h").read_text().count("    double ") == 2
 
 
+FLOATING = ["--dbc", str(ROOT / "tests" / "unit" / "floating" / "floating.dbc")]
+
+
+@pytest.mark.parametrize(
+    ("nodes", "options", "texts"),
+    [
+        ("<ScriptCondition code='Level.Water &gt; 1'/>", [], ["'Level.Water' is floating point", "--allow-floating-point"]),
+        ("<Script code='Pump.Power := 1'/>", [], ["'Pump.Power' is floating point", "use a leaf"]),
+        ("<Go speed='{Level.Water}'/>", [], ["port 'speed' of 'Go': 'Level.Water' is floating point"]),
+        ("<Go speed='{Level.Water}'/>", ["--allow-floating-point"],
+         ["port 'speed' of 'Go': a floating-point signal would be cut to int32_t", "convert it in a script"]),
+    ],
+)  # fmt: skip
+def test_floating_point_signals_are_refused_by_name(
+    tmp_path: Path, nodes: str, options: list[str], texts: list[str]
+) -> None:
+    result = compile_files(tmp_path, {"main.xml": tree(nodes)}, *FLOATING, *options)
+    assert result.exit_code == 2, result.output
+    for text in texts:
+        assert text in result.stderr
+
+
 GROOT = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <root BTCPP_format="4"

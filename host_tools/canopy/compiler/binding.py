@@ -166,7 +166,7 @@ class _Binder:
         value: Value
         if isinstance(source, SignalName):
             value = self._compiler(script).signal(source.text, 0)
-            return self._kind_of(value, [value.wide], script.place(), entry)
+            return self._kind_of(value, [isinstance(value, Num) and value.wide], script.place(), entry)
         value = guess(source.initial or "" if isinstance(source, Entry) else source)
         return self._kind_of(value, [], script.place(), entry)
 
@@ -292,15 +292,22 @@ class _Binder:
         if isinstance(bound.target, Entry):
             return self._connected(node.leaf, bound, bound.target, where, bindings)
         if isinstance(bound.target, SignalName):
-            compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
-            try:
-                c = compiler.storing.convert(compiler.signal(bound.target.text, 0), port.type, 0)
-            except ScriptError as error:
-                raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
-            return BoundPort(_zero(port.type), stripped(c))
+            return self._signal(bound, bound.target, where)
         if bound.text is None:
             return BoundPort("NULL")
         return BoundPort(_constant(bound.text, port.type, where, bound.place))
+
+    def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
+        kind = bound.port.type
+        compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
+        try:
+            value = compiler.signal(target.text, 0)
+            if isinstance(value, Double) and kind.kind != "float":
+                raise ScriptError(0, f"a floating-point signal would be cut to {kind}", "convert it in a script")
+            c = compiler.storing.convert(value, kind, 0)
+        except ScriptError as error:
+            raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
+        return BoundPort(_zero(kind), stripped(c))
 
     def _connected(self, leaf: Leaf, bound: Bound, entry: Entry, where: str, bindings: Bindings) -> BoundPort:
         port = bound.port

@@ -53,6 +53,7 @@ BOOL = PortType("bool", "bool", 0, 1)
 INT32 = _integer(32, signed=True)
 INT64 = _integer(64, signed=True)
 DURATION = PortType("duration", "uint32_t", 0, 2**32 - 1)
+FLOAT = PortType("float", "float")
 DOUBLE = PortType("float", "double")
 TEXT = PortType("text", "const char *")
 ANY = PortType("any", "")
@@ -71,7 +72,7 @@ PORT_TYPES: dict[str, PortType] = {
     "long": INT64,
     "unsigned long": _integer(64, signed=False),
     "size_t": _integer(64, signed=False),
-    "float": PortType("float", "float"),
+    "float": FLOAT,
     "double": DOUBLE,
     "std::string": TEXT,
     "std::string_view": TEXT,

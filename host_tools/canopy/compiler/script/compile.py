@@ -10,7 +10,7 @@ from canopy.compiler.bus_reader import Bus, Message, Signal
 from canopy.compiler.codec import value_type
 from canopy.compiler.errors import CompileError, Place, nearest, plain
 from canopy.compiler.names import snake
-from canopy.compiler.port_types import PortType
+from canopy.compiler.port_types import DOUBLE, FLOAT, PortType
 from canopy.compiler.script.arithmetic import Arithmetic
 from canopy.compiler.script.storing import Storing, stripped
 from canopy.compiler.script.syntax import (
@@ -189,7 +189,7 @@ class Compiler:
             index, f"node '{self._bus.node}' of {self._bus.path.name} does not {verb} '{name}'", nearest(name, known)
         )
 
-    def signal(self, text: str, index: int) -> Num:
+    def signal(self, text: str, index: int) -> Num | Double:
         """A received signal in physical units, or whether its message is fresh."""
         message_name, _, signal_name = text.partition(".")
         message = self._message(message_name, self._bus.receive, "receive", index)
@@ -202,6 +202,8 @@ class Compiler:
         if signal in message.multiplexed:
             self.parts.add(f"{member}.{signal.has_name}")
         c = f"{member}.{signal.c_name}"
+        if signal.is_float:
+            return self._float(Double(c if signal.c_type == "double" else f"(double){c}"), signal, index)
         if signal.is_bool:
             return Num(c, "bool", 0, 1, is_bool=True)
         low, high = signal.limits
@@ -212,12 +214,24 @@ class Compiler:
 
     def _signal(self, message: Message, name: str, index: int) -> Signal:
         for signal in message.signals:
-            if signal.name == name and signal.is_float:
-                raise ScriptError(index, f"'{message.name}.{name}' is a float, which scripts cannot use", "use a leaf")
+            if signal.name == name and signal.is_float and not self._arithmetic.floats:
+                raise ScriptError(
+                    index,
+                    f"'{message.name}.{name}' is floating point, which this application does not allow",
+                    "use a leaf, or compile with --allow-floating-point",
+                )
             if signal.name == name:
                 return signal
         known = ["fresh", *(signal.name for signal in message.signals)]
         raise ScriptError(index, f"message '{message.name}' has no signal '{name}'", nearest(name, known))
+
+    def _float(self, raw: Double, signal: Signal, index: int) -> Double:
+        """A floating-point signal in physical units."""
+        scaled = raw if signal.scale == 1 else self._arithmetic.binary("*", raw, Const(Fraction(signal.scale)), index)
+        if signal.offset != 0:
+            scaled = self._arithmetic.binary("+", scaled, Const(Fraction(signal.offset)), index)
+        assert isinstance(scaled, Double)
+        return scaled
 
     def _physical(self, raw: Num, signal: Signal, index: int) -> Num:
         scale, offset = Fraction(signal.scale), Fraction(signal.offset)
@@ -287,6 +301,8 @@ class Compiler:
 
     def _raw(self, value: Value, message: Message, signal: Signal, index: int, text: str) -> str:
         """The C expression of a raw value, of the setter's type."""
+        if signal.is_float:
+            return self._raw_float(value, signal, index)
         if signal.choices:
             names = {name: raw for raw, name in signal.choices}
             enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}"
@@ -308,6 +324,14 @@ class Compiler:
                 "compute it in whole numbers",
             )
         return self._raw_number(value, signal, index, text)
+
+    def _raw_float(self, value: Value, signal: Signal, index: int) -> str:
+        raw = value
+        if signal.offset != 0:
+            raw = self._arithmetic.binary("-", raw, Const(Fraction(signal.offset)), index)
+        if signal.scale != 1:
+            raw = self._arithmetic.binary("/", raw, Const(Fraction(signal.scale)), index)
+        return self.storing.convert(raw, FLOAT if signal.c_type == "float" else DOUBLE, index)
 
     def _raw_number(self, value: Num | Const, signal: Signal, index: int, text: str) -> str:
         scale, offset = Fraction(signal.scale), Fraction(signal.offset)

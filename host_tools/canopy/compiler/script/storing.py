@@ -33,7 +33,7 @@ class Storing:
             raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
         if kind.kind == "float":
             c = self._arithmetic.double(value, index)
-            return c if kind.c == "double" else f"(float)({c})"
+            return c if kind.c == "double" else f"(float)({stripped(c)})"
         if kind.kind == "bool":
             truth = self._arithmetic.truth(value, index)
             return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
