@@ -34,10 +34,10 @@ static bool status_fits(const canopy_tree_t *tree, const canopy_node_t *node, un
     return status > (int32_t)CANOPY_IDLE && status <= (int32_t)CANOPY_SKIPPED;
 }
 
-/** All parameters of an Attributes node are scripts, or none. */
-static bool attributes_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+/** All parameters of the node from `first` on are scripts, or none. */
+static bool scripts_fit(const canopy_tree_t *tree, const canopy_node_t *node, unsigned first)
 {
-    for (unsigned which = 0; which < shapes[CANOPY_NODE_ATTRIBUTES].parameters; which++) {
+    for (unsigned which = first; which < shapes[node->type].parameters; which++) {
         if (!script_fits(tree, node, which, -1)) {
             return false;
         }
@@ -73,7 +73,10 @@ static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
     }
 
     if (type == (uint8_t)CANOPY_NODE_ATTRIBUTES) {
-        return attributes_fit(tree, node);
+        return scripts_fit(tree, node, 0);
+    }
+    if (type == (uint8_t)CANOPY_NODE_TEST_NODE) {
+        return status_fits(tree, node, 0) && scripts_fit(tree, node, 2);
     }
     if (type == (uint8_t)CANOPY_NODE_PRECONDITION || type == (uint8_t)CANOPY_NODE_LOOP) {
         return script_fits(tree, node, 0, 0) && status_fits(tree, node, 1);

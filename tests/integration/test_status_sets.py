@@ -130,6 +130,8 @@ def test_the_sets_are_sharp_where_rules_need_them(tmp_path: Path) -> None:
         "<Precondition if='n == 1' else='SKIPPED'><Yes/></Precondition>": "SKIPPED SUCCESS",
         "<Yes _skipIf='n == 1'/>": "SKIPPED SUCCESS",
         "<LoopInt queue='1;2' value='{n}' if_empty='FAILURE'><Yes/></LoopInt>": "FAILURE RUNNING",
+        "<TestNode return_status='FAILURE'/>": "FAILURE",
+        "<TestNode async_delay='5'/>": "RUNNING SUCCESS",
         "<Switch2 variable='{n}' case_1='1' case_2='2'><Yes/><No/><Busy/></Switch2>": "FAILURE RUNNING SUCCESS",
     }
     for nodes, expected in cases.items():

@@ -211,6 +211,16 @@ static void updates_are_counted_where_a_node_waits_for_them(void)
     TEST_ASSERT_EQUAL_INT32(1, language_entries->seen);
 }
 
+static void test_nodes_stand_in_for_leaves(void)
+{
+    cycle();
+    cycle();
+    TEST_ASSERT_EQUAL_INT32(0, language_entries->stand_in);
+    cycle(); /* 20 ms after the first */
+    TEST_ASSERT_EQUAL_INT32(2, language_entries->stand_in);
+    TEST_ASSERT_EQUAL_INT32(11, language_entries->posts);
+}
+
 static void control_nodes_and_decorators_of_the_users_own(void)
 {
     language_entries->mode = 2;
@@ -247,6 +257,7 @@ int main(void)
     RUN_TEST(a_loop_takes_one_item_a_tick);
     RUN_TEST(a_loop_takes_the_items_of_an_entry);
     RUN_TEST(updates_are_counted_where_a_node_waits_for_them);
+    RUN_TEST(test_nodes_stand_in_for_leaves);
     RUN_TEST(control_nodes_and_decorators_of_the_users_own);
     RUN_TEST(nothing_was_limited);
     return UNITY_END();

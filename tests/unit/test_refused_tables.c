@@ -256,8 +256,8 @@ static void ticks_to_a_fault(uint8_t type)
 static void a_leaf_that_has_children_is_a_fault(void)
 {
     static const uint8_t types[] = {
-        CANOPY_NODE_CONDITION,      CANOPY_NODE_SYNC_ACTION, CANOPY_NODE_STATEFUL_ACTION,  CANOPY_NODE_ALWAYS_SUCCESS,
-        CANOPY_NODE_ALWAYS_FAILURE, CANOPY_NODE_SLEEP,       CANOPY_NODE_WAS_ENTRY_UPDATED};
+        CANOPY_NODE_CONDITION,      CANOPY_NODE_SYNC_ACTION, CANOPY_NODE_STATEFUL_ACTION,   CANOPY_NODE_ALWAYS_SUCCESS,
+        CANOPY_NODE_ALWAYS_FAILURE, CANOPY_NODE_SLEEP,       CANOPY_NODE_WAS_ENTRY_UPDATED, CANOPY_NODE_TEST_NODE};
 
     for (unsigned type = 0; type < sizeof types; type++) {
         ticks_to_a_fault(types[type]);

@@ -30,6 +30,7 @@ LEAVES: dict[str, Statuses] = {
     "AlwaysFailure": frozenset((F,)),
     "Sleep": frozenset((S, R)),
     "WasEntryUpdated": frozenset((S, F)),
+    "TestNode": frozenset((S, F, R, K)),
 }
 
 
@@ -304,6 +305,9 @@ RULES: dict[str, Rule] = {
 
 def leaf_statuses(node: Node) -> Statuses:
     """What a leaf can return: what it declares, else what its kind allows; and its answer to stale signals."""
+    if node.type.name == "TestNode":
+        status, delay = node.parameters[:2]
+        return _given(status) | ({R} if delay else NONE)
     declared = node.leaf.returns if node.leaf is not None else ()
     result = frozenset(declared) or LEAVES.get(node.type.name, ANY)
     if node.leaf is not None and node.leaf.reads:

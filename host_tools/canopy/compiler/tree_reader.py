@@ -35,7 +35,7 @@ USER_KINDS = ("Condition", "SyncAction", "StatefulAction")
 INTERNAL = ("Attributes", "Loop", "Switch", "Control", "Decorator")
 
 # Of BehaviorTree.CPP 4, and known to be missing here: refused by name, not as a typing error.
-NOT_SUPPORTED = frozenset(("TestNode", "ManualSelector"))
+NOT_SUPPORTED = frozenset(("ManualSelector",))
 
 EXPLICIT = {"Action": "LEAF", "Condition": "LEAF", "Control": "CONTROL", "Decorator": "DECORATOR"}
 
