@@ -224,6 +224,9 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_ATTRIBUTES:
         canopy_attributes_halt(self, node);
         break;
+    case CANOPY_NODE_TRY_CATCH:
+        canopy_try_catch_halt(self, node);
+        break;
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         canopy_user_halt(self, node);
@@ -245,7 +248,6 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_REACTIVE_PARALLEL:
     case CANOPY_NODE_IF_THEN_ELSE:
     case CANOPY_NODE_WHILE_DO_ELSE:
-    case CANOPY_NODE_TRY_CATCH:
     case CANOPY_NODE_INVERTER:
     case CANOPY_NODE_FORCE_SUCCESS:
     case CANOPY_NODE_FORCE_FAILURE:

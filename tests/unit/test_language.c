@@ -221,6 +221,14 @@ static void test_nodes_stand_in_for_leaves(void)
     TEST_ASSERT_EQUAL_INT32(11, language_entries->posts);
 }
 
+static void a_script_cleans_up_after_a_try_that_is_halted(void)
+{
+    cycle(); /* the loop's first item, and Sleep starts */
+    TEST_ASSERT_FALSE(language_entries->cleaned_up);
+    cycle(); /* the second one makes the condition true: Sleep is halted */
+    TEST_ASSERT_TRUE(language_entries->cleaned_up);
+}
+
 static void control_nodes_and_decorators_of_the_users_own(void)
 {
     language_entries->mode = 2;
@@ -258,6 +266,7 @@ int main(void)
     RUN_TEST(a_loop_takes_the_items_of_an_entry);
     RUN_TEST(updates_are_counted_where_a_node_waits_for_them);
     RUN_TEST(test_nodes_stand_in_for_leaves);
+    RUN_TEST(a_script_cleans_up_after_a_try_that_is_halted);
     RUN_TEST(control_nodes_and_decorators_of_the_users_own);
     RUN_TEST(nothing_was_limited);
     return UNITY_END();

@@ -183,14 +183,15 @@ def _if_then_else(_node: Node, children: Sequence[Statuses]) -> Outcome:
     return Outcome(frozenset(result), (True, S in asked, F in asked)[: len(children)])
 
 
-def _try_catch(_node: Node, children: Sequence[Statuses]) -> Outcome:
+def _try_catch(node: Node, children: Sequence[Statuses]) -> Outcome:
     tried = _in_order(children[:-1], S, F)
     result = set(tried.statuses - {F})
     if F in tried.statuses:
         result |= children[-1] & {R}
         if children[-1] & {S, F, K}:
             result.add(F)
-    return Outcome(frozenset(result), (*tried.ticked, F in tried.statuses))
+    on_halt = node.parameters[0] != 0 and R in tried.statuses
+    return Outcome(frozenset(result), (*tried.ticked, F in tried.statuses or on_halt))
 
 
 def _map(**changed: str) -> Rule:

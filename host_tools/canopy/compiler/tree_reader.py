@@ -91,7 +91,19 @@ class _Builder:
                 node.children.append(outer)
                 if inner_element.children:
                     waiting.append((inner, inner_element, inner_instance))
+            self._check_handler(node)
         return root
+
+    @staticmethod
+    def _check_handler(node: Node) -> None:
+        """A halt is no tick: what it ticks is a leaf with a function."""
+        if node.type.name == "TryCatch" and node.parameters != (0,) and node.children[-1].type.name not in USER_KINDS:
+            raise CompileError(
+                node.children[-1].place,
+                "with catch_on_halt the last child of <TryCatch> must be a leaf of yours or a Script, "
+                "without pre- and postconditions",
+                "a halt cannot go down a tree: do the clean-up in one leaf",
+            )
 
     def _main_ports(self, scope: Scope, tree_id: str) -> None:
         """The ports of the main tree are what the program itself writes and reads."""
@@ -269,12 +281,6 @@ class _Builder:
 
     def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
         own = {parameter.name for parameter in kind.parameters}
-        if kind.name == "TryCatch":
-            own.add("catch_on_halt")
-            if element.attributes.get("catch_on_halt", "false") != "false":
-                raise CompileError(
-                    element.place, "catch_on_halt is not supported", "give the last child's work to a halt handler"
-                )
         self._check_attributes(element, own)
         parameters = tuple(self._parameter(element, parameter, scope) for parameter in kind.parameters)
         name = element.attributes.get("name", kind.name)
