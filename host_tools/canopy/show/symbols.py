@@ -44,7 +44,7 @@ class Look:
 
 
 def parameter_text(node: Node) -> str:
-    """The parameters as `3` or `success_count=1 failure_count=2`; a flag as its name; a script that is not there not."""
+    """The parameters as `3` or `success_count=1 failure_count=2`, without the scripts that are not there."""
     values = [value.text if isinstance(value, Script) else value for value in node.parameters]
     named = list(zip(node.type.parameters, values, strict=False))
     if node.type.name == "TryCatch":
