@@ -235,3 +235,11 @@ def test_every_construct_compiles_without_a_warning(tmp_path: Path) -> None:
             "/dev/null",
         ]
         subprocess.run(command, check=True)
+
+
+def test_texts_of_a_leaf_need_names_of_their_own(tmp_path: Path) -> None:
+    for texts in ("low noise;low-noise", "red;?"):
+        model = f"<Action ID='A'><output_port name='p' type='std::string'/><MetadataFields><Metadata texts='{texts}'/></MetadataFields></Action>"
+        result = compile_files(tmp_path, {"main.xml": tree("<A p='{e}'/>", model=model)})
+        assert result.exit_code == 2
+        assert "gives no C name of its own" in result.stderr

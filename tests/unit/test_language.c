@@ -172,6 +172,20 @@ static void texts_are_places_in_a_table(void)
     TEST_ASSERT_EQUAL_STRING("green", language_texts[language_entries->text]);
 }
 
+static void leaves_write_texts_and_queues_of_texts(void)
+{
+    static const char *const said[] = {"light green", "red"};
+
+    cycle();
+    TEST_ASSERT_EQUAL_STRING("light green", language_texts[language_entries->colour]);
+    TEST_ASSERT_EQUAL_STRING("red", language_texts[language_entries->text_before]);
+    for (unsigned tick = 0; tick < 2u; tick++) {
+        TEST_ASSERT_EQUAL_STRING(said[tick], language_texts[language_entries->next_colour]);
+        TEST_ASSERT_EQUAL_UINT16(1u - tick, language_entries->colours.count);
+        cycle();
+    }
+}
+
 static void a_loop_takes_one_item_a_tick(void)
 {
     static const int32_t sums[] = {10, 20, -30};
@@ -262,6 +276,7 @@ int main(void)
     RUN_TEST(scripts_that_read_stale_signals_are_false);
     RUN_TEST(a_switch_takes_the_case_that_matches);
     RUN_TEST(texts_are_places_in_a_table);
+    RUN_TEST(leaves_write_texts_and_queues_of_texts);
     RUN_TEST(a_loop_takes_one_item_a_tick);
     RUN_TEST(a_loop_takes_the_items_of_an_entry);
     RUN_TEST(updates_are_counted_where_a_node_waits_for_them);

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from canopy.compiler.blackboard import Entry, SignalName, Use
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.leaf_c import writes_texts
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.port_types import ANY, BOOL, DOUBLE, INT32, INT64, TEXT, Options, PortType, literal
 from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess
@@ -84,6 +85,10 @@ class _Binder:
                 script.body = bodies.body(script, self._parsed.get(id(script), ()))
             except ScriptError as error:
                 raise script_error(script, error) from error
+        for node in self._nodes:
+            if node.leaf is not None and writes_texts(node.leaf):
+                for text in node.leaf.texts:
+                    self._texts.index(text)
         bindings = Bindings(leaves=leaves)
         for node in self._nodes:
             if node.leaf is not None and node.bound:
@@ -283,11 +288,11 @@ class _Binder:
         where = f"port '{port.name}' of '{node.leaf.id}'"
         if port.type.kind == "any":
             raise CompileError(bound.place, f"{where}: nothing gives it a type", f"declare it, at {port.place}")
-        if port.writes and port.type.kind == "text":
+        if port.writes and port.type.holds_texts and not node.leaf.texts:
             raise CompileError(
                 port.place,
-                f"{where}: texts are constants, and cannot be written",
-                "use an enum of yours, or a whole number",
+                f"{where}: texts are constants, and nothing says which ones it may write",
+                f"list them in the model of '{node.leaf.id}': <Metadata texts=\"red;green\"/>",
             )
         if isinstance(bound.target, Entry):
             return self._connected(node.leaf, bound, bound.target, where, bindings)

@@ -22,11 +22,13 @@ from canopy.compiler.leaf_c import (
     arguments,
     entry_note,
     entry_type,
+    item_type,
     parameters,
     port_members,
     prototypes,
     setters,
     stale_test,
+    text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
@@ -202,6 +204,8 @@ def environment(bus: Bus) -> jinja2.Environment:
         "setters": setters,
         "entry_type": entry_type,
         "entry_note": entry_note,
+        "item_type": item_type,
+        "text_constants": text_constants,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }

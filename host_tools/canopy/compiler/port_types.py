@@ -22,7 +22,8 @@ class PortType:
 
     Fixed point is a whole number of steps: the value in C times `scale` is what the tree's texts and scripts mean.
 
-    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items.
+    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items. Texts in
+    entries and queues are places in the application's table of texts.
     """
 
     kind: Kind
@@ -37,6 +38,11 @@ class PortType:
         if self.kind == "fixed":
             return f"{self.c} in steps of {plain(self.scale)}"
         return {"text": "a constant text", "duration": "a duration [ms]", "any": "any type"}.get(self.kind, self.c)
+
+    @property
+    def holds_texts(self) -> bool:
+        """Is it a text, or a queue of texts?"""
+        return self.kind == "text" or self.item == TEXT.c
 
     @property
     def is_number(self) -> bool:
@@ -105,14 +111,17 @@ def _normal(name: str) -> str:
     return re.sub(r"\s+", " ", text.removeprefix("const ") if "*" not in text else text)
 
 
-_QUEUE = re.compile(r"(?P<item>[\w ]+?) ?\[(?P<capacity>\d{1,5})\]")
+_QUEUE = re.compile(r"(?P<item>[\w: ]+?) ?\[(?P<capacity>\d{1,5})\]")
 MAX_CAPACITY = 65_535
 
 
 def _queue(item: PortType, capacity: int, where: str, place: Place) -> PortType:
-    if item.kind not in ("bool", "int", "float") or not 1 <= capacity <= MAX_CAPACITY:
-        raise CompileError(place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers", "for example type='int32_t[8]'")
-    return PortType("user", f"canopy_queue_{item.c.removesuffix('_t')}_{capacity}_t", item=item.c, capacity=capacity)
+    if item.kind not in ("bool", "int", "float", "text") or not 1 <= capacity <= MAX_CAPACITY:
+        raise CompileError(
+            place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers or texts", "for example type='int32_t[8]'"
+        )
+    name = "text" if item == TEXT else item.c.removesuffix("_t")
+    return PortType("user", f"canopy_queue_{name}_{capacity}_t", item=item.c, capacity=capacity)
 
 
 # int16_t*0.01, as a DBC has its factors; int16_t/256, as in binary fixed point.

@@ -124,10 +124,11 @@ class Bodies:
         assert script.type is not None
         kind = queue.type
         if kind.item != script.type.c:
+            items, name = ("texts", "std::string") if script.type == TEXT else (script.type.c, script.type.c)
             raise ScriptError(
                 0,
-                f"entry '{queue.name}' is {kind}, and a queue of {script.type.c} is needed",
-                f"declare the port that fills it as type='{script.type.c}[8]'",
+                f"entry '{queue.name}' is {kind}, and a queue of {items} is needed",
+                f"declare the port that fills it as type='{name}[8]'",
             )
         member = f"app->entries.{queue.c_name}"
         return [

@@ -26,6 +26,26 @@ canopy_status_t fill_queue_tick(const language_input_t *in, const fill_queue_por
     return CANOPY_SUCCESS;
 }
 
+/* The texts that a leaf writes are constants of its own. */
+canopy_status_t choose_colour_tick(const language_input_t *in, const choose_colour_ports_t *ports)
+{
+    static const canopy_queue_text_2_t queue = {.count = 2, .items = {CHOOSE_COLOUR_LIGHT_GREEN, CHOOSE_COLOUR_RED}};
+
+    (void)in;
+    choose_colour_set_colour(ports, ports->number == 1 ? CHOOSE_COLOUR_LIGHT_GREEN : CHOOSE_COLOUR_RED);
+    if (*ports->last != (uint16_t)CHOOSE_COLOUR_RED) {
+        choose_colour_set_last(ports, CHOOSE_COLOUR_RED);
+        choose_colour_set_queue(ports, &queue);
+    }
+    return CANOPY_SUCCESS;
+}
+
+canopy_status_t say_tick(const language_input_t *in, const say_ports_t *ports)
+{
+    (void)in;
+    return ports->text[0] != '\0' ? CANOPY_SUCCESS : CANOPY_FAILURE;
+}
+
 canopy_status_t use_goal_tick(const language_input_t *in, const use_goal_ports_t *ports, use_goal_state_t *self)
 {
     static const float_free_t value = {.bytes = {1, 2, 3}};
