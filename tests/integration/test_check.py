@@ -30,6 +30,7 @@ MODEL = """\
     <Action ID="Track"><MetadataFields><Metadata returns="RUNNING"/></MetadataFields></Action>
     <Action ID="Fails"><MetadataFields><Metadata returns="FAILURE"/></MetadataFields></Action>
     <Action ID="Recharge"><MetadataFields><Metadata moves="Battery.Level"/></MetadataFields></Action>
+    <Action ID="Charges"><MetadataFields><Metadata moves="B.L"/></MetadataFields></Action>
     <Action ID="OpenDoor"/>
     <Action ID="PassDoor"/>
     <Action ID="CloseDoor"/>
@@ -103,6 +104,22 @@ CASES = [
      "<ReactiveFallback><Rested/><Recharge/></ReactiveFallback>"),
     ("no-hysteresis", "<ReactiveFallback><BatteryOk/><Recharge/></ReactiveFallback>", "chattering",
      "<Fallback><BatteryOk/><Recharge/></Fallback>"),
+    ("no-hysteresis",
+     "<ReactiveFallback><ScriptCondition code='!Bus.fresh || Battery.Level &gt; 20'/><Recharge/></ReactiveFallback>",
+     "<ScriptCondition> decides whether <Recharge> runs, which moves 'Battery.Level'",
+     "<ReactiveFallback><ScriptCondition code='Battery.Level &gt; (full ? 20 : 9)'/><Recharge/></ReactiveFallback>"),
+    ("no-hysteresis",
+     "<ReactiveFallback><ScriptCondition code='B.L &lt; 2 || Up == B.M'/><Charges/></ReactiveFallback>",
+     "moves 'B.L'",
+     "<ReactiveFallback><ScriptCondition code='Battery.Level &gt; 20 || @mode == 1'/><Recharge/></ReactiveFallback>"),
+    ("no-hysteresis", "<WhileDoElse><ScriptCondition code='20 &lt; Battery.Level'/><Go/><Recharge/></WhileDoElse>",
+     "chattering",
+     "<WhileDoElse><ScriptCondition code='Battery.Level == 20'/><Go/><Recharge/></WhileDoElse>"),
+    ("no-hysteresis", "<Recharge _while='Battery.Level &lt; 20'/>",
+     "_while=\"Battery.Level < 20\" decides whether <Recharge> runs",
+     "<Recharge _skipIf='Battery.Level &gt; 20'/>"),
+    ("no-hysteresis", "<Recharge _while='Battery.Level &lt; 20'/>", "chattering",
+     "<Recharge _while='Battery.Current &lt; 20'/>"),
     ("unbounded-retry", "<RetryUntilSuccessful num_attempts='-1'><Blink/></RetryUntilSuccessful>", "has no end",
      "<RetryUntilSuccessful num_attempts='-1'><Go/></RetryUntilSuccessful>"),
     ("unbounded-retry", "<Repeat num_cycles='-1'><Ready/></Repeat>", "has no end",
