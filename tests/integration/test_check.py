@@ -41,7 +41,7 @@ MODEL = """\
     <Action ID="Walk"><input_port name="speed" type="int" default="3"/></Action>"""
 
 TREE = """\
-<root BTCPP_format="4">
+<root BTCPP_format="4" main_tree_to_execute="Main">
   <BehaviorTree ID="Main">
     {nodes}
   </BehaviorTree>
@@ -134,6 +134,9 @@ CASES = [
      "<Fallback><Go/><Stop/></Fallback>"),
     ("root-can-fail", "<Fallback><Go/><Speak/></Fallback>", "'Main' can return FAILURE",
      "<Fallback><Go/><Stop/></Fallback>"),
+    ("unused-tree", "<Go/></BehaviorTree><BehaviorTree ID='Spare'><Go/>",
+     "tree 'Spare' is no part of the main tree 'Main'",
+     "<SubTree ID='Spare'/></BehaviorTree><BehaviorTree ID='Spare'><Go/>"),
     ("unused-port", "<Sequence><Walk/><Walk/></Sequence>",
      "port 'speed' of 'Walk' is left at its default by its 2 uses",
      "<Sequence><Walk speed='5'/><Walk/></Sequence>"),
@@ -175,6 +178,23 @@ def test_a_tree_of_every_construct_with_the_compilers_options_about_types() -> N
     result = run(*arguments, "--include", "state.h")
     assert result.exit_code == 0
     assert result.output.endswith("1 note\n")
+
+
+def test_trees_that_are_not_used_are_checked_too(tmp_path: Path) -> None:
+    spare = (
+        "<Go/></BehaviorTree>\n<BehaviorTree ID='Inner'><ForceSuccess><Go/></ForceSuccess></BehaviorTree>"
+        "\n<BehaviorTree ID='Spare'><Sequence><SubTree ID='Inner'/><Walk/></Sequence></BehaviorTree>"
+        "\n<BehaviorTree ID='Draft'><Gp/>"
+    )
+    result = run(write(tmp_path, spare), "--disable", "root-can-fail", "-q")
+    assert [line.split(":", 1)[1] for line in result.output.splitlines()[:-1]] == [
+        "4:1: note: tree 'Inner' is no part of the main tree 'Main' [unused-tree]",
+        "4:26: warning: <ForceSuccess> hides that <Go> can fail [hidden-failure]",
+        "5:1: note: tree 'Spare' is no part of the main tree 'Main' [unused-tree]",
+        "6:1: note: tree 'Draft' is no part of the main tree 'Main' [unused-tree]",
+        "6:26: note: tree 'Draft' is not used, and would not compile: unknown node 'Gp' [unused-tree]",
+    ]
+    assert run(write(tmp_path, spare), "--disable", "unused-tree", "-q").output.count("hidden-failure") == 0
 
 
 def test_floating_point_and_types_of_the_users_own(tmp_path: Path) -> None:
