@@ -69,7 +69,9 @@ def test_each_file_is_included_once_and_named_in_the_model(tmp_path: Path) -> No
     [
         ({"a.xml": INNER.format('<include path="main.xml"/>')}, "a.xml:1:", ["in a loop: main.xml -> a.xml -> main.xml"]),
         ({"a.xml": INNER.format('<include path="a.xml"/>')}, "a.xml:1:", ["in a loop"]),
-        ({"a.xml": INNER.format('<include ros_pkg="x" path="y"/>')}, "a.xml:1:", ["ros_pkg=…> is not supported"]),
+        ({"a.xml": INNER.format('<include ros_pkg="x" path="y"/>')}, "a.xml:1:",
+         ["<include ros_pkg='x'>: the folder of this package is not known", "--ros-package x=DIR"]),
+        ({"a.xml": INNER.format('<include pat="y"/>')}, "a.xml:1:", ["<include> has no attribute 'pat'", "did you mean 'path'?"]),
         ({"a.xml": INNER.format("<include/>")}, "a.xml:1:", ["needs the attribute path"]),
         ({"a.xml": INNER.format('<BehaviorTree ID="Main"><AlwaysSuccess/></BehaviorTree>')}, "main.xml:2:", ["not 'Main'", "the other one:"]),
         ({"a.xml": INNER.format('<TreeNodesModel><Action ID="Go"/></TreeNodesModel>')}, "main.xml:6:", ["'Go' is declared again"]),
@@ -83,6 +85,23 @@ def test_wrong_includes_are_named(tmp_path: Path, files: dict[str, str], place: 
     assert result.stderr.startswith(str(tmp_path / place)), result.stderr
     for part in texts:
         assert part in result.stderr
+
+
+def test_trees_of_a_ros_package_are_found_where_its_folder_is(tmp_path: Path) -> None:
+    text = tree('<SubTree ID="Inner"/>').replace(
+        "<BehaviorTree", '<include ros_pkg="lib" path="a/b.xml"/><BehaviorTree', 1
+    )
+    (tmp_path / "share").mkdir()
+    files = {
+        "main.xml": text,
+        "share/c.xml": INNER.format(""),
+        "share/a/b.xml": '<root BTCPP_format="4"><include path="../c.xml"/></root>',
+    }
+    result = compile_files(tmp_path, files, "--ros-package", f"lib={tmp_path / 'share'}")
+    assert result.exit_code == 0, result.output
+    misnamed = compile_files(tmp_path, files, "--ros-package", f"lip={tmp_path / 'share'}")
+    assert "did you mean 'lip'?" in misnamed.stderr
+    assert "'lib' is not NAME=DIR" in compile_files(tmp_path, files, "--ros-package", "lib").stderr
 
 
 SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'

@@ -8,6 +8,7 @@ import html
 import re
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, plain
@@ -96,11 +97,12 @@ PORT_TYPES: dict[str, PortType] = {
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says about types."""
+    """What the command line says about types, and where the ROS packages are whose trees may be included."""
 
     floats: bool = False
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
+    ros_packages: dict[str, Path] = field(default_factory=dict)
 
 
 def _normal(name: str) -> str:

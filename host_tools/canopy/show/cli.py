@@ -35,7 +35,13 @@ def _write(target: str, text: str) -> None:
 @click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
 @type_options
 def command(
-    tree: Path, svg_file: str | None, dot_file: str | None, include: str | None, floats: bool, type_map: tuple[str, ...]
+    tree: Path,
+    svg_file: str | None,
+    dot_file: str | None,
+    include: str | None,
+    floats: bool,
+    type_map: tuple[str, ...],
+    packages: tuple[str, ...],
 ) -> None:
     """Draw TREE: in the terminal, as SVG, or as DOT.
 
@@ -49,7 +55,7 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree, read_type_options(include, floats, type_map))
+        checked = read_tree(tree, read_type_options(include, floats, type_map, packages))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
