@@ -176,7 +176,7 @@ def _queues(table: Table) -> list[PortType]:
 
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
-    return f"{Path(place.file).name}:{place.line}"
+    return f"{os.path.basename(place.file)}:{place.line}"
 
 
 def _exact(place: Place) -> str:

@@ -84,9 +84,9 @@ class Arithmetic:
             if not INT64[0] <= steps <= INT64[1]:
                 raise ScriptError(index, f"{plain(value.value)} is too large for 64 bits")
             return literal(steps, scale)
-        factor = int(value.scale / scale)
-        if factor == 1:
+        if value.scale == scale:
             return value
+        factor = int(value.scale / scale)
         low, high = sorted((value.low * factor, value.high * factor))
         if low < INT64[0] or high > INT64[1]:
             raise ScriptError(

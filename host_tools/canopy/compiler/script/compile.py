@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
+from functools import cache
 
 from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
@@ -66,6 +68,12 @@ def guess(text: str) -> Const | TextConst:
         return Const(Fraction(int(text, 0)) if text.strip().lower()[:2] == "0x" else Fraction(text.strip()))
     except (ValueError, ZeroDivisionError):
         return TextConst(text)
+
+
+@cache
+def _steps(scale: Decimal, offset: Decimal) -> tuple[Fraction, Fraction, Fraction]:
+    """A signal's scale and offset exactly, and the step of which both are multiples."""
+    return Fraction(scale), Fraction(offset), common_scale(abs(Fraction(scale)), abs(Fraction(offset)))
 
 
 class Compiler:
@@ -234,8 +242,7 @@ class Compiler:
         return scaled
 
     def _physical(self, raw: Num, signal: Signal, index: int) -> Num:
-        scale, offset = Fraction(signal.scale), Fraction(signal.offset)
-        step = common_scale(abs(scale), abs(offset))
+        scale, offset, step = _steps(signal.scale, signal.offset)
         value = self._arithmetic.scaled(Num(raw.c, raw.c_type, raw.low, raw.high, abs(scale)), step, index)
         if scale < 0:
             negative = self._arithmetic.unary("-", value, index)

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+import re
+
 from canopy.compiler.errors import plain
 from canopy.compiler.port_types import PortType, integer
 from canopy.compiler.script.arithmetic import Arithmetic
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import INT64, Const, Double, Num, TextConst, TextVar, Value, describe, number
+
+_BRACKETS = re.compile("[()]")
 
 
 class Storing:
@@ -47,8 +51,8 @@ class Storing:
         """The C expression of a whole number of the type's steps."""
         if isinstance(value, Const):
             return self._constant(value, kind, index)
-        if (value.scale / kind.scale).denominator != 1:
-            factor = (value.scale / kind.scale).denominator
+        factor = 1 if value.scale == kind.scale else (value.scale / kind.scale).denominator
+        if factor != 1:
             help_text = f"multiply it by {factor}, and count in that unit"
             if kind.kind == "fixed":
                 help_text = f"declare a type in steps of which {plain(value.scale)} is a multiple"
@@ -89,8 +93,8 @@ def stripped(c: str) -> str:
     if not (c.startswith("(") and c.endswith(")")):
         return c
     depth = 0
-    for place, character in enumerate(c):
-        depth += {"(": 1, ")": -1}.get(character, 0)
-        if depth == 0 and place != len(c) - 1:
+    for bracket in _BRACKETS.finditer(c):
+        depth += 1 if bracket[0] == "(" else -1
+        if depth == 0 and bracket.end() != len(c):
             return c
     return c[1:-1]
