@@ -104,6 +104,31 @@ def test_trees_of_a_ros_package_are_found_where_its_folder_is(tmp_path: Path) ->
     assert "'lib' is not NAME=DIR" in compile_files(tmp_path, files, "--ros-package", "lib").stderr
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong", "place", "texts"),
+    [
+        ("main_tree_to_execute", "main_tree_to_exec", "1:43", ["<root> has no attribute 'main_tree_to_exec'", "did you mean 'main_tree_to_execute'?"]),
+        ("<BehaviorTree ID", "<BehaviorTree Id='x' ID", "2:19", ["<BehaviorTree> has no attribute 'Id'", "known here: ID"]),
+        ('default="3"', 'defualt="3"', "9:94", ["<input_port> has no attribute 'defualt'", "did you mean 'default'?"]),
+        ('<Decorator ID="Guard"', '<Decorator ID="Guard" kind="x"', "17:29", ["<Decorator> has no attribute 'kind'"]),
+    ],
+)  # fmt: skip
+def test_attributes_that_nobody_knows_are_refused(
+    tmp_path: Path, right: str, wrong: str, place: str, texts: list[str]
+) -> None:
+    text = tree("<AlwaysSuccess/>")
+    kept = '<root xmlns:x="urn:x" x:y="1" project_name="Mine" ' + text.removeprefix("<root ").replace(
+        "<BehaviorTree", "<BehaviorTree _fullpath='a'", 1
+    )
+    assert compile_files(tmp_path, {"main.xml": kept}).exit_code == 0
+    assert right in text
+    result = compile_files(tmp_path, {"main.xml": text.replace(right, wrong, 1)})
+    assert result.exit_code == 2, result.output
+    assert f"main.xml:{place}: error:" in result.stderr, result.stderr
+    for part in texts:
+        assert part in result.stderr
+
+
 SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
 
 

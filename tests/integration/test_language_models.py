@@ -243,3 +243,11 @@ def test_texts_of_a_leaf_need_names_of_their_own(tmp_path: Path) -> None:
         result = compile_files(tmp_path, {"main.xml": tree("<A p='{e}'/>", model=model)})
         assert result.exit_code == 2
         assert "gives no C name of its own" in result.stderr
+
+
+@pytest.mark.parametrize("item", ["std::chrono::milliseconds", "pose_t"])
+def test_queues_hold_numbers_and_texts(tmp_path: Path, item: str) -> None:
+    model = f"<Action ID='A'><output_port name='p' type='{item}[4]'/></Action>"
+    result = compile_files(tmp_path, {"main.xml": tree("<A p='{e}'/>", model=model)}, "--include", "mine.h")
+    assert result.exit_code == 2
+    assert "a queue has 1 to 65535 numbers or texts" in result.stderr

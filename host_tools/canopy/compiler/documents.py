@@ -61,15 +61,11 @@ class _Reader:
         root = read_xml(path)
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
             raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
+        root.only("BTCPP_format", "main_tree_to_execute", "project_name")
         return root
 
     def _included(self, element: Element, file: Path) -> Path:
-        known = ("path", "ros_pkg")
-        for attribute in element.attributes:
-            if attribute not in known:
-                raise CompileError(
-                    element.place, f"<include> has no attribute '{attribute}'", nearest(attribute, known)
-                )
+        element.only("path", "ros_pkg")
         if not element.attributes.get("path"):
             raise CompileError(element.place, "<include> needs the attribute path", 'for example path="other.xml"')
         return self._folder(element, file) / element.attributes["path"]
@@ -90,6 +86,7 @@ class _Reader:
 
     def _take(self, element: Element) -> None:
         if element.tag == "BehaviorTree":
+            element.only("ID", "name", "description")
             tree_id = element.attributes.get("ID", "")
             if not tree_id or tree_id in self.documents.trees:
                 first = f"the other one: {self.documents.trees[tree_id].place}" if tree_id else ""

@@ -131,6 +131,7 @@ class _Draft:
 
 
 def _read_port(element: Element, options: Options) -> Port:
+    element.only("name", "type", "default", "description")
     name = element.attributes.get("name", "")
     if not is_c_identifier(snake(name)) or not name:
         raise CompileError(element.place, f"<{element.tag}> needs a name that can be a C identifier, not '{name}'")
@@ -265,6 +266,7 @@ def read_model(model: Element, into: Declarations, options: Options, built_in: f
         node_id = element.attributes.get("ID", "")
         if not node_id:
             raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
+        element.only("ID", "name", "editable", "description")
         if element.tag == "SubTree":
             into.subtrees[node_id] = tuple(_read_draft(element, node_id, options).ports)
             continue

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.errors import CompileError, Place, nearest
 
 MAX_BYTES = 16 * 1024 * 1024
 MAX_DEPTH = 65_534
@@ -44,6 +44,17 @@ class Element:
         if index:
             start += sum(map(len, _CHARACTER.findall(self.source[start:end])[:index]))
         return self._place_of(start)
+
+    def only(self, *known: str) -> None:
+        """Refuses an attribute that is not known; not those of other namespaces, and what editors keep (`_…`).
+
+        Raises:
+            CompileError: with the attribute's place, and the nearest name.
+        """
+        for name in self.attributes:
+            if name not in known and ":" not in name and not name.startswith(("_", "xmlns")):
+                place = self.attribute_place(name)
+                raise CompileError(place, f"<{self.tag}> has no attribute '{name}'", nearest(name, known))
 
     def _read_again(self) -> dict[bytes, tuple[int, int]]:
         """Where each attribute's value begins and ends."""
