@@ -57,7 +57,7 @@ def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
         "--type-map",
         "std::vector<int>=list_t",
         "--type-map",
-        "my::Celsius=int32_t*0.1",
+        "my::Celsius=int32_t * 0.1",
         "--include",
         "mine.h",
     ]
@@ -98,6 +98,13 @@ def test_floating_point_signals_are_refused_by_name(
     assert result.exit_code == 2, result.output
     for text in texts:
         assert text in result.stderr
+
+
+def test_a_constant_that_no_double_can_hold_is_refused(tmp_path: Path) -> None:
+    nodes = "<Script code='x := 0.5; y := x * 1e400'/>"
+    result = compile_files(tmp_path, {"main.xml": tree(nodes)}, "--allow-floating-point")
+    assert result.exit_code == 2
+    assert "a number that is too large for floating point" in result.stderr
 
 
 GROOT = """\

@@ -6,7 +6,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 
 
 @dataclass(frozen=True)
@@ -44,11 +43,3 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     return f"known here: {', '.join(names)}" if names else "none is known here"
-
-
-def plain(value: Fraction) -> str:
-    """A fraction as people write it."""
-    if value.denominator == 1:
-        return str(value.numerator)
-    text = repr(float(value))
-    return text if Fraction(text) == value else f"{value.numerator}/{value.denominator}"

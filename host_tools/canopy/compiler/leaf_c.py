@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
-from canopy.compiler.errors import plain
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.names import snake
+from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"

@@ -11,8 +11,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
-from canopy.compiler.errors import CompileError, Place, plain
+from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
+from canopy.compiler.numbers import exact, plain
 
 Kind = Literal["bool", "int", "fixed", "duration", "float", "text", "user", "any"]
 
@@ -136,7 +137,7 @@ def is_fixed_point(name: str) -> bool:
 
 
 def _fixed(base: PortType, sign: str, step: str, where: str, place: Place) -> PortType:
-    number = Fraction(step)
+    number = exact(step) if len(step) < 40 else Fraction(0)
     if base.kind != "int" or number == 0:
         raise CompileError(
             place, f"{where}: '{base.c}{sign}{step}' is no fixed-point type", "for example type='int16_t*0.01'"
@@ -152,7 +153,7 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
         CompileError: it is no known type, or one that this application does not allow.
     """
     normal = _normal(name)
-    mapped = {_normal(key): value for key, value in options.type_map.items()}
+    mapped = {_normal(key): _normal(value) for key, value in options.type_map.items()}
     normal = mapped.get(normal, normal)
     known = PORT_TYPES.get(normal) or PORT_TYPES.get(normal.removeprefix("std::"))
     if known is not None:
@@ -231,8 +232,8 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
 def _steps(text: str, kind: PortType, where: str, place: Place) -> int:
     """How many steps of a fixed-point type a text in physical units is."""
     try:
-        steps = Fraction(text.strip()) / kind.scale
-    except (ValueError, ZeroDivisionError):
+        steps = exact(text) / kind.scale
+    except ValueError:
         raise CompileError(place, f"{where}: '{text}' is not a number ({kind})") from None
     if steps.denominator != 1:
         near = [plain(whole * kind.scale) for whole in (steps.__floor__(), steps.__ceil__())]

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
-from canopy.compiler.errors import nearest, plain
+from canopy.compiler.errors import nearest
+from canopy.compiler.numbers import plain
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import (
     INT64,
@@ -67,7 +68,10 @@ class Arithmetic:
         if isinstance(value, Double):
             return value.c
         if isinstance(value, Const):
-            return repr(float(value.value))
+            try:
+                return repr(float(value.value))
+            except OverflowError:
+                raise ScriptError(index, "a number that is too large for floating point") from None
         if isinstance(value, Num):
             text = f"(double){value.c}"
             if value.scale.numerator != 1:

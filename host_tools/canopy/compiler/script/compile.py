@@ -10,8 +10,9 @@ from functools import cache
 from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
 from canopy.compiler.codec import value_type
-from canopy.compiler.errors import CompileError, Place, nearest, plain
+from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import snake
+from canopy.compiler.numbers import exact, plain
 from canopy.compiler.port_types import DOUBLE, FLOAT, PortType
 from canopy.compiler.script.arithmetic import Arithmetic
 from canopy.compiler.script.storing import Storing, stripped
@@ -65,8 +66,8 @@ def guess(text: str) -> Const | TextConst:
     if text.strip() in ("true", "false"):
         return Const(Fraction(text.strip() == "true"), is_bool=True)
     try:
-        return Const(Fraction(int(text, 0)) if text.strip().lower()[:2] == "0x" else Fraction(text.strip()))
-    except (ValueError, ZeroDivisionError):
+        return Const(exact(text))
+    except ValueError:
         return TextConst(text)
 
 

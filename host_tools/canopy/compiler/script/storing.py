@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 
-from canopy.compiler.errors import plain
+from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType, integer
 from canopy.compiler.script.arithmetic import Arithmetic
 from canopy.compiler.script.syntax import ScriptError
