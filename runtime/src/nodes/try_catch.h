@@ -59,11 +59,13 @@ static CANOPY_SELDOM canopy_step_t canopy_try_catch_child(canopy_tree_instance_t
     return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
 }
 
-/** The other children have been halted. */
-static inline void canopy_try_catch_halt(canopy_tree_instance_t *self, uint16_t node)
+/** The other children have been halted. Calls the leaf itself: what is shared with a tick is inlined there only. */
+static CANOPY_SELDOM void canopy_try_catch_halt(canopy_tree_instance_t *self, uint16_t node)
 {
     uint16_t handler;
-    canopy_step_t step;
+    uint16_t parameter;
+    const canopy_leaf_t *leaf;
+    canopy_status_t status;
 
     if (canopy_parameter(self, node, 0) == 0) {
         return;
@@ -72,15 +74,15 @@ static inline void canopy_try_catch_halt(canopy_tree_instance_t *self, uint16_t 
     if (*canopy_words(self, node) == handler) {
         return;
     }
-    if (canopy_is_simple_leaf(&self->tree->nodes[handler])) {
-        step = canopy_leaf_enter(self, handler);
+    leaf = canopy_leaf(self, handler);
+    parameter = self->tree->nodes[handler].parameter;
+    status = leaf->tick(self->application, parameter);
+    if (canopy_is_simple_leaf(&self->tree->nodes[handler]) || status != CANOPY_RUNNING) {
+        status = canopy_leaf_checked(self, handler, status);
     } else {
-        step = canopy_stateful_action_enter(self, handler);
+        leaf->halted(self->application, parameter);
     }
-    if (step == canopy_done(CANOPY_RUNNING)) {
-        canopy_stateful_action_halt(self, handler);
-    }
-    self->status[handler] = (uint8_t)((uint8_t)CANOPY_STATUS_WAS | (uint8_t)(step - CANOPY_STEP_DONE));
+    self->status[handler] = (uint8_t)((uint8_t)CANOPY_STATUS_WAS | (uint8_t)status);
 }
 
 #endif
