@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
 #                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [TYPE_MAP "C++ type=C type"…]
+#                        [ROS_PACKAGE name=folder…]
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
@@ -29,7 +30,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH"
-                        "LEAVES;TYPE_MAP")
+                        "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
       message(FATAL_ERROR "canopy_add_application(${NAME}): ${required} is missing")
@@ -58,6 +59,11 @@ function(canopy_add_application NAME)
   endif()
   foreach(pair IN LISTS APP_TYPE_MAP)
     list(APPEND options --type-map "${pair}")
+  endforeach()
+  foreach(pair IN LISTS APP_ROS_PACKAGE) # the build runs elsewhere
+    string(REGEX MATCH "^([^=]*)=(.*)$" matched "${pair}")
+    cmake_path(ABSOLUTE_PATH CMAKE_MATCH_2 BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+    list(APPEND options --ros-package "${CMAKE_MATCH_1}=${CMAKE_MATCH_2}")
   endforeach()
   add_custom_command(
     OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"

@@ -152,3 +152,17 @@ def test_a_deep_tree_is_drawn(tmp_path: Path) -> None:
     file.write_text(f"<root BTCPP_format='4'><BehaviorTree ID='T'>{deep}</BehaviorTree></root>")
     assert show(file).count("\n") == 2_002
     assert show(file, "--svg", "-").count("<g>") == 2_001
+
+
+def test_a_tree_with_types_of_the_users_own() -> None:
+    language = REPOSITORY / "tests" / "unit" / "language" / "main.xml"
+    refused = CliRunner().invoke(main, ["show", str(language)])
+    assert refused.exit_code == 2
+    assert "name its header with --include" in refused.output
+    shown = show(language, "--include", "state.h")
+    assert "TryCatch [catch_on_halt]" in shown
+    assert "[TestNode return_status=3 async_delay=0 failure_script=stand_in = 2 post_script=posts += 1]" in shown
+    floating = REPOSITORY / "tests" / "unit" / "floating" / "main.xml"
+    assert "[Measure]" in show(floating, "--allow-floating-point")
+    wrong = CliRunner().invoke(main, ["show", str(language), "--type-map", "x"])
+    assert (wrong.exit_code, "'x' is not CXX=C" in wrong.output) == (2, True)

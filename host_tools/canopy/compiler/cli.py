@@ -15,7 +15,7 @@ from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render, write_files
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
-from canopy.compiler.port_types import Options
+from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
@@ -35,8 +35,11 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
 
 
 def type_options(command: _Command) -> _Command:
-    """The options about types, of every command that reads trees."""
+    """The options about types and includes, of every command that reads trees."""
     for option in (
+        click.option(
+            "--ros-package", "packages", multiple=True, metavar="NAME=DIR", help="Folder of an <include ros_pkg>."
+        ),
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
             "--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double."
@@ -49,19 +52,27 @@ def type_options(command: _Command) -> _Command:
     return command
 
 
-def read_type_options(include: str | None, floats: bool, type_map: tuple[str, ...]) -> Options:
+def read_type_options(
+    include: str | None, floats: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
+) -> Options:
     """What `type_options` were given.
 
     Raises:
-        CompileError: a --type-map is malformed.
+        CompileError: a --type-map or --ros-package is malformed.
     """
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not is_c_identifier(c_type.strip()):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
-    return Options(floats, result, include)
+    folders = {}
+    for pair in packages:
+        name, found, folder = pair.partition("=")
+        if not found or not name or not folder:
+            raise CompileError(Place("--ros-package"), f"'{pair}' is not NAME=DIR", "for example my_trees=src/my_trees")
+        folders[name] = Path(folder)
+    return Options(floats, result, include, folders)
 
 
 @click.command()
@@ -88,6 +99,7 @@ def command(
     include: str | None,
     floats: bool,
     type_map: tuple[str, ...],
+    packages: tuple[str, ...],
     stubs_file: Path | None,
     depfile: Path | None,
     bitrate: int,
@@ -106,7 +118,7 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        options = read_type_options(include, floats, type_map)
+        options = read_type_options(include, floats, type_map, packages)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options)
         files = render(application)
     except CompileError as error:

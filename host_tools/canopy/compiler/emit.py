@@ -21,13 +21,16 @@ from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.leaf_c import (
     arguments,
+    entry_note,
     entry_type,
     function_names,
+    item_type,
     parameters,
     port_members,
     prototypes,
     setters,
     stale_test,
+    text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
@@ -175,7 +178,7 @@ def _queues(table: Table) -> list[PortType]:
 
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
-    return f"{Path(place.file).name}:{place.line}"
+    return f"{os.path.basename(place.file)}:{place.line}"
 
 
 def _identifier(text: str) -> str:
@@ -209,6 +212,9 @@ def environment(bus: Bus) -> jinja2.Environment:
         "port_members": port_members,
         "setters": setters,
         "entry_type": entry_type,
+        "entry_note": entry_note,
+        "item_type": item_type,
+        "text_constants": text_constants,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }

@@ -44,10 +44,14 @@ class Look:
 
 
 def parameter_text(node: Node) -> str:
-    """The parameters as `3` or `success_count=1 failure_count=2`."""
-    values = (value.text if isinstance(value, Script) else value for value in node.parameters)
-    named = list(zip((parameter.name for parameter in node.type.parameters), values, strict=False))
-    return str(named[0][1]) if len(named) == 1 else " ".join(f"{name}={value}" for name, value in named)
+    """The parameters as `3` or `success_count=1 failure_count=2`, without the scripts that are not there."""
+    values = [value.text if isinstance(value, Script) else value for value in node.parameters]
+    named = list(zip(node.type.parameters, values, strict=False))
+    if node.type.name == "TryCatch":
+        return "" if values[0] == 0 else "catch_on_halt" if values[0] == 1 else f"catch_on_halt={values[0]}"
+    if len(named) == 1:
+        return str(values[0])
+    return " ".join(f"{parameter.name}={value}" for parameter, value in named if value != -1 or parameter.default)
 
 
 def look(node: Node, *, ascii_only: bool = False) -> Look:

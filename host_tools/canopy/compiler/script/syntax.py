@@ -23,6 +23,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from canopy.compiler.numbers import exact
+
 MAX_NESTING = 100
 
 ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
@@ -284,8 +286,10 @@ class _Parser:
     def _atom(self) -> Expression:
         token = self._take()
         if token.kind == "number":
-            is_hex = token.text[:2].lower() == "0x"
-            return Number(token.index, Fraction(int(token.text, 16)) if is_hex else Fraction(token.text))
+            try:
+                return Number(token.index, exact(token.text))
+            except ValueError:
+                raise ScriptError(token.index, "a number that is too long") from None
         if token.kind == "text":
             return Text(token.index, token.text[1:-1])
         if token.kind == "name":
