@@ -59,7 +59,11 @@ class _Reader:
         self.documents.files.append(path)
         root = read_xml(path)
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
-            raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
+            raise CompileError(
+                root.place,
+                'the outer element must be <root BTCPP_format="4">',
+                "a file without it may be one of BehaviorTree.CPP 3, which Groot2 converts",
+            )
         return root
 
     def _included(self, element: Element, file: Path) -> Path:

@@ -18,7 +18,18 @@ from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_c import arguments, entry_type, parameters, port_members, prototypes, setters, stale_test
+from canopy.compiler.layout import layout
+from canopy.compiler.leaf_c import (
+    arguments,
+    entry_type,
+    parameters,
+    place_constant,
+    port_members,
+    prototypes,
+    row_fields,
+    setters,
+    stale_test,
+)
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
 from canopy.compiler.script.compile import Texts
@@ -192,6 +203,8 @@ def environment(bus: Bus) -> jinja2.Environment:
         "port_members": port_members,
         "setters": setters,
         "entry_type": entry_type,
+        "place_constant": place_constant,
+        "row_fields": row_fields,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }
@@ -202,7 +215,9 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
     """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
     templates = environment(bus)
     return {
-        f"{bus.name}_bus.{suffix}": templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        f"{bus.name}_bus.{suffix}": layout(
+            templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        )
         for suffix in ("h", "c")
     }
 
@@ -218,6 +233,7 @@ def render(application: Application) -> dict[str, str]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
@@ -229,7 +245,7 @@ def render(application: Application) -> dict[str, str]:
     }
     files = render_bus(application.bus, application.period_ms)
     files |= {
-        file: environment(application.bus).get_template(template).render(context)
+        file: layout(environment(application.bus).get_template(template).render(context))
         for file, template in templates.items()
     }
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"

@@ -67,6 +67,10 @@ PORT_TYPES: dict[str, PortType] = {
     "size_t": _integer(64, signed=False),
     "float": PortType("float", "float"),
     "double": DOUBLE,
+    # As in the messages of ROS.
+    **{f"{u}int{bits}": _integer(bits, signed=not u) for u in ("", "u") for bits in (8, 16, 32, 64)},
+    "float32": PortType("float", "float"),
+    "float64": DOUBLE,
     "std::string": TEXT,
     "std::string_view": TEXT,
     "const char *": TEXT,
@@ -88,6 +92,11 @@ class Options:
     floats: bool = False
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
+    any_type: bool = False  # types for which there is nothing in C are accepted
+
+
+# For tools that make no C.
+ANY_TYPE = Options(floats=True, any_type=True)
 
 
 def _normal(name: str) -> str:
@@ -129,6 +138,8 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     queue = _QUEUE.fullmatch(normal)
     if queue is not None:
         return _queue(read_type(queue["item"], where, place, options), int(queue["capacity"]), where, place)
+    if options.any_type:
+        return PortType("user", normal)
     if not is_c_identifier(normal):
         raise CompileError(
             place,

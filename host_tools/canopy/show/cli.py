@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from canopy.compiler.errors import CompileError
+from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
 from canopy.show.dot import dot
 from canopy.show.svg import svg
@@ -45,7 +46,7 @@ def command(tree: Path, svg_file: str | None, dot_file: str | None) -> None:
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree)
+        checked = read_tree(tree, ANY_TYPE)
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
