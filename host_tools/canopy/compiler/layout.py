@@ -8,6 +8,7 @@ The templates write each statement on one line and leave its breaks to this. The
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -93,10 +94,30 @@ def _wrap(line: str, columns: tuple[int, ...] = ()) -> list[str]:
     return assigned[0] if assigned and len(assigned[0]) + slack <= len(broken) else broken
 
 
-def _own_line(code: str, comment: str) -> str:
+def _comment(line: str) -> list[str]:
+    """A line that is one comment, on as many lines as it needs."""
+    indent = line[: len(line) - len(line.lstrip())]
+    mark, _, text = line.strip().removesuffix(" */").partition(" ")
+    inner = f"{indent} * "
+    words = textwrap.TextWrapper(
+        COLUMNS, initial_indent=inner, subsequent_indent=inner, break_long_words=False, break_on_hyphens=False
+    )
+    return [indent + mark, *words.wrap(text), f"{indent} */"]
+
+
+def _whole(line: str) -> list[str]:
+    """A line that no comment is behind."""
+    if len(line) <= COLUMNS:
+        return [line]
+    text = line.lstrip()
+    if text.startswith(("/* ", "/** ")) and text.endswith(" */"):
+        return _comment(line)
+    return [line] if text.startswith(("/*", "*", "#")) else _wrap(line)
+
+
+def _above(code: str, comment: str) -> str:
     """The comment as a line above its code."""
-    indent = code[: len(code) - len(code.lstrip())]
-    return indent + comment.replace("/**<", "/**", 1)
+    return code[: len(code) - len(code.lstrip())] + comment.replace("/**<", "/**", 1)
 
 
 def _with_comments(run: list[tuple[str, str]]) -> Iterator[str]:
@@ -112,8 +133,8 @@ def _with_comments(run: list[tuple[str, str]]) -> Iterator[str]:
             yield f"{code.ljust(column)}{comment}"
         if long < len(run):
             code, comment = run[long]
-            yield _own_line(code, comment)
-            yield from _wrap(code)
+            yield from _whole(_above(code, comment))
+            yield from _whole(code)
         run = run[long + 1 :]
 
 
@@ -126,10 +147,7 @@ def _lines(lines: Iterable[str]) -> Iterator[str]:
             continue
         yield from _with_comments(run)
         run = []
-        if len(line) > COLUMNS and not line.lstrip().startswith(("/*", "*", "#")):
-            yield from _wrap(line)
-        else:
-            yield line
+        yield from _whole(line)
     yield from _with_comments(run)
 
 
