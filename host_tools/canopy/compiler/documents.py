@@ -24,6 +24,13 @@ class Documents:
     declarations: Declarations = field(default_factory=Declarations)
 
 
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that no file can have
+        return False
+
+
 class _Reader:
     def __init__(self, options: Options, built_in: frozenset[str]) -> None:
         self._options = options
@@ -53,7 +60,7 @@ class _Reader:
         return top
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
-        if included_by is not None and not path.is_file():
+        if included_by is not None and not _is_file(path):
             place = included_by.attribute_place("path")
             raise CompileError(place, f"the included file '{path}' is not there", "paths are relative to this file")
         self.documents.files.append(path)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 COLUMNS = 120
+TOO_LONG = 5_000  # a statement that no reader would read on several lines, either
 
 _CONTINUED = 4
 _TRAILING = re.compile(r"(?P<code>.*\S) +(?P<comment>/\*(?:[^*]|\*(?!/))*\*/)")
@@ -112,7 +113,7 @@ def _whole(line: str) -> list[str]:
     text = line.lstrip()
     if text.startswith(("/* ", "/** ")) and text.endswith(" */"):
         return _comment(line)
-    return [line] if text.startswith(("/*", "*", "#")) else _wrap(line)
+    return [line] if text.startswith(("/*", "*", "#")) or len(line) > TOO_LONG else _wrap(line)
 
 
 def _above(code: str, comment: str) -> str:

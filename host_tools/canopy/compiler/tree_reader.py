@@ -216,7 +216,9 @@ class _Builder:
         count = len(element.children)
         if node.leaf is not None and not node.leaf.is_inner and count:
             raise CompileError(element.children[0].place, f"'{node_id}' is a leaf and cannot have children")
-        if not node.type.least_children <= count <= node.type.most_children:
+        if not node.type.least_children <= count <= min(node.type.most_children, MAX_NODES):
+            if count > MAX_NODES:
+                raise CompileError(element.place, f"the tree has more than {MAX_NODES} nodes")
             raise CompileError(
                 element.place, f"<{node_id}> needs {node.type.arity_text()} child node(s), and has {count}"
             )
