@@ -252,7 +252,11 @@ class _Builder:
         if text is None:
             if port.direction == "out":
                 return Bound(port, place)
-            raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
+            raise CompileError(
+                element.place,
+                f"'{leaf.id}' needs a value for its port '{port.name}'",
+                f"or give the port a default where it is declared: {port.place}",
+            )
         name = pointer(text, port.name)
         if name is None:
             if port.writes:
