@@ -11,6 +11,7 @@ from canopy.compiler.leaf_model import Declarations, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, read_xml
 
+UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
 
 
@@ -87,9 +88,10 @@ class _Reader:
 
     def _take(self, element: Element) -> None:
         if element.tag == "BehaviorTree":
-            tree_id = element.attributes.get("ID", "")
-            if not tree_id or tree_id in self.documents.trees:
-                first = f"the other one: {self.documents.trees[tree_id].place}" if tree_id else ""
+            # BehaviorTree.CPP accepts a lone tree without an ID; two of them meet here.
+            tree_id = element.attributes.get("ID") or UNNAMED
+            if tree_id in self.documents.trees:
+                first = f"the other one: {self.documents.trees[tree_id].place}"
                 raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
             if len(element.children) != 1:
                 raise CompileError(
