@@ -120,7 +120,7 @@ def test_a_wrong_declaration_of_a_leaf_is_named(tmp_path: Path, model: str, text
         (b"\xff\xfe\x00", "main.xml:1:", "not well-formed XML"),
         (b"<root BTCPP_format='4'><BehaviorTree/></root>", "main.xml:1:24", "needs exactly 1 node, and has 0"),
         (
-            b"<root BTCPP_format='4'><BehaviorTree><Sleep/></BehaviorTree>\n<BehaviorTree><Sleep/></BehaviorTree></root>",
+            b"<root BTCPP_format='4'><BehaviorTree><A/></BehaviorTree>\n<BehaviorTree><A/></BehaviorTree></root>",
             "main.xml:2:1",
             "needs an ID of its own",
         ),
