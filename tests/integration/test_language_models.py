@@ -44,6 +44,8 @@ def test_stubs_compile_and_are_never_overwritten(tmp_path: Path, compiler: str) 
         ("nav_msgs::msg::Path", "const path_t *"),
         ("std::vector&amp;lt;int&amp;gt;", "const list_t *"),
         ("double", "double"),
+        ("uint16", "uint16_t"),
+        ("float64", "double"),
         ("pose_t", "const pose_t *"),
         ("int16_t*0.01", "int16_t"),
         ("unsigned char / 4", "uint8_t"),
@@ -68,6 +70,18 @@ def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
     assert result.exit_code == 0, result.output
     spaced = c_type if c_type.endswith("*") else f"{c_type} "
     assert f"    {spaced}p;" in (tmp_path / "out" / "main_leaves.h").read_text()
+
+
+def test_a_port_in_both_directions_has_two_names(tmp_path: Path) -> None:
+    port = '<{}_port name="index" type="int"/>'
+    texts = []
+    for name in ("inout", "bidirectional"):
+        model = f'<Control ID="Resume">{port.format(name)}</Control>'
+        nodes = "<Sequence><Script code='i := 0'/><Resume index='{i}'><AlwaysSuccess/></Resume></Sequence>"
+        assert compile_files(tmp_path, {"main.xml": tree(nodes, model=model)}).exit_code == 0
+        texts.append((tmp_path / "out" / "main_leaves.h").read_text())
+    assert texts[0] == texts[1]
+    assert "int32_t *index;" in texts[0]
 
 
 def test_floating_point_only_where_it_is_allowed(tmp_path: Path) -> None:

@@ -34,6 +34,10 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
 
 
+def _not_written(error: OSError, output: Path) -> CompileError:
+    return CompileError(Place(str(error.filename or output)), f"cannot be written: {error.strerror}")
+
+
 def type_options(command: _Command) -> _Command:
     """The options about types and includes, of every command that reads trees."""
     for option in (
@@ -129,18 +133,20 @@ def command(
         if most is not None and used > most:
             click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
+    made: list[Path] = []  # goes again when not all can be written
     try:
         if stubs_file is not None:
             write_stubs(stubs_file, stubs(application.name, application.table, application.bus))
+            made.append(stubs_file)
         write_files(output, files)
+        made += [output / file for file in files]
         if depfile is not None:
             read = [str(file.resolve()) for file in (*application.table.tree.files, dbc)]
             depfile.write_text(f"{output / application.name}_app.c: {' '.join(read)}\n".replace("\\", "/"))
-    except CompileError as error:
-        click.echo(str(error), err=True)
-        sys.exit(INPUT_ERROR)
-    except OSError as error:
-        click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
+    except (CompileError, OSError) as error:
+        for path in made:
+            path.unlink(missing_ok=True)
+        click.echo(str(error if isinstance(error, CompileError) else _not_written(error, output)), err=True)
         sys.exit(INPUT_ERROR)
     if as_json:
         click.echo(json.dumps(budget.as_dict()))

@@ -11,6 +11,7 @@ from canopy.compiler.leaf_model import Declarations, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, read_xml
 
+UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
 
 
@@ -22,6 +23,13 @@ class Documents:
     trees: dict[str, Element] = field(default_factory=dict)
     main: str = ""
     declarations: Declarations = field(default_factory=Declarations)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that no file can have
+        return False
 
 
 class _Reader:
@@ -54,13 +62,17 @@ class _Reader:
         return top
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
-        if included_by is not None and not path.is_file():
+        if included_by is not None and not _is_file(path):
             place = included_by.attribute_place("path")
             raise CompileError(place, f"the included file '{path}' is not there", "paths are relative to this file")
         self.documents.files.append(path)
         root = read_xml(path)
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
-            raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
+            raise CompileError(
+                root.place,
+                'the outer element must be <root BTCPP_format="4">',
+                "a file without it may be one of BehaviorTree.CPP 3, which Groot2 converts",
+            )
         root.only("BTCPP_format", "main_tree_to_execute", "project_name")
         return root
 
@@ -87,9 +99,10 @@ class _Reader:
     def _take(self, element: Element) -> None:
         if element.tag == "BehaviorTree":
             element.only("ID", "name", "description")
-            tree_id = element.attributes.get("ID", "")
-            if not tree_id or tree_id in self.documents.trees:
-                first = f"the other one: {self.documents.trees[tree_id].place}" if tree_id else ""
+            # BehaviorTree.CPP accepts a lone tree without an ID; two of them meet here.
+            tree_id = element.attributes.get("ID") or UNNAMED
+            if tree_id in self.documents.trees:
+                first = f"the other one: {self.documents.trees[tree_id].place}"
                 raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
             if len(element.children) != 1:
                 raise CompileError(

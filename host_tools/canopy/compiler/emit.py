@@ -19,6 +19,7 @@ from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
     entry_note,
@@ -26,8 +27,10 @@ from canopy.compiler.leaf_c import (
     function_names,
     item_type,
     parameters,
+    place_constant,
     port_members,
     prototypes,
+    row_fields,
     setters,
     stale_test,
     text_constants,
@@ -215,6 +218,8 @@ def environment(bus: Bus) -> jinja2.Environment:
         "entry_note": entry_note,
         "item_type": item_type,
         "text_constants": text_constants,
+        "place_constant": place_constant,
+        "row_fields": row_fields,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }
@@ -225,7 +230,9 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
     """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
     templates = environment(bus)
     return {
-        f"{bus.name}_bus.{suffix}": templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        f"{bus.name}_bus.{suffix}": layout(
+            templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        )
         for suffix in ("h", "c")
     }
 
@@ -241,6 +248,7 @@ def render(application: Application) -> dict[str, str]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
@@ -252,7 +260,7 @@ def render(application: Application) -> dict[str, str]:
     }
     files = render_bus(application.bus, application.period_ms)
     files |= {
-        file: environment(application.bus).get_template(template).render(context)
+        file: layout(environment(application.bus).get_template(template).render(context))
         for file, template in templates.items()
     }
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"

@@ -54,6 +54,7 @@ PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
     "input_port": "in",
     "output_port": "out",
     "inout_port": "inout",
+    "bidirectional_port": "inout",  # the name in older models
 }
 MODEL_TAGS = ("Action", "Condition", "Control", "Decorator", "SubTree")
 

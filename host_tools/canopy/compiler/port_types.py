@@ -82,6 +82,10 @@ PORT_TYPES: dict[str, PortType] = {
     "size_t": _integer(64, signed=False),
     "float": FLOAT,
     "double": DOUBLE,
+    # As in the messages of ROS.
+    **{f"{u}int{bits}": _integer(bits, signed=not u) for u in ("", "u") for bits in (8, 16, 32, 64)},
+    "float32": FLOAT,
+    "float64": DOUBLE,
     "std::string": TEXT,
     "std::string_view": TEXT,
     "const char *": TEXT,
@@ -104,6 +108,11 @@ class Options:
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
     ros_packages: dict[str, Path] = field(default_factory=dict)
+    any_type: bool = False  # types for which there is nothing in C are accepted
+
+
+# For tools that make no C.
+ANY_TYPE = Options(floats=True, any_type=True)
 
 
 def _normal(name: str) -> str:
@@ -171,6 +180,8 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     if fixed is not None:
         base = read_type(fixed["base"], where, place, options)
         return _fixed(base, fixed["sign"], fixed["step"], where, place)
+    if options.any_type:
+        return PortType("user", normal)
     if not is_c_identifier(normal):
         raise CompileError(
             place,

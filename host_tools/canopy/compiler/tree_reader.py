@@ -232,7 +232,9 @@ class _Builder:
         count = len(element.children)
         if node.leaf is not None and not node.leaf.is_inner and count:
             raise CompileError(element.children[0].place, f"'{node_id}' is a leaf and cannot have children")
-        if not node.type.least_children <= count <= node.type.most_children:
+        if not node.type.least_children <= count <= min(node.type.most_children, MAX_NODES):
+            if count > MAX_NODES:
+                raise CompileError(element.place, f"the tree has more than {MAX_NODES} nodes")
             raise CompileError(
                 element.place, f"<{node_id}> needs {node.type.arity_text()} child node(s), and has {count}"
             )
@@ -266,7 +268,11 @@ class _Builder:
         if text is None:
             if port.direction == "out":
                 return Bound(port, place)
-            raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
+            raise CompileError(
+                element.place,
+                f"'{leaf.id}' needs a value for its port '{port.name}'",
+                f"or give the port a default where it is declared: {port.place}",
+            )
         name = pointer(text, port.name)
         if name is None:
             if port.writes:

@@ -78,6 +78,13 @@ _ATTRIBUTE = re.compile(rb"\s+(?P<name>[^\s=/>]+)\s*=\s*(?P<value>\"[^\"]*\"|'[^
 _CHARACTER = re.compile(rb"&[^;]*;|[\x00-\x7f\xc0-\xff][\x80-\xbf]*", re.DOTALL)
 
 
+def unreadable_encoding(file: str, error: Exception) -> CompileError:
+    """For what expat raises when it does not know the encoding in the XML declaration."""
+    return CompileError(
+        Place(file, 1, 1), f"the encoding that the file names cannot be read: {error}", "save it as UTF-8"
+    )
+
+
 class _Builder:
     def __init__(self, file: str) -> None:
         self._file = file
@@ -122,6 +129,8 @@ class _Builder:
         except expat.ExpatError as error:
             place = Place(self._file, error.lineno, error.offset + 1)
             raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+        except (LookupError, ValueError) as error:
+            raise unreadable_encoding(self._file, error) from error
         assert self._root is not None  # expat refuses a document without an element
         return self._root
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -55,7 +56,8 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree, read_type_options(include, floats, type_map, packages))
+        options = read_type_options(include, floats, type_map, packages)
+        checked = read_tree(tree, replace(options, floats=True, any_type=True))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
