@@ -25,7 +25,7 @@ class Wanted:
 
     kinds: tuple[str, ...]
     nonsense: bool = True
-    """Leaves that answer with no valid status, or RUNNING where it is not allowed."""
+    """Leaves that answer with no valid status, or RUNNING where it may not be: in some trees none, in others many."""
     odd_times: bool = True
     """Times that stand still, wrap around, or go back."""
     seldom: tuple[str, ...] = ()
@@ -100,6 +100,7 @@ class Generator:
         self._rng = rng
         self._decorated = rng.choice((0.1, 0.3, 0.3, 0.7))
         self._slanted = rng.random() < 0.4
+        self._nonsense = rng.choice((0.0, 0.03, 0.1, 0.3)) if self.wanted.nonsense else 0.0
         self._choose_kinds()
         root = self._node(size, depth)
         halt_after = rng.randrange(1, TICKS) if rng.random() < 0.3 else None
@@ -155,7 +156,7 @@ class Generator:
             return Spec(kind, [], self._parameters(kind, []))
         start = rng.randrange(_POOL - TICKS)
         answers = _answers(rng.randrange(len(_MOODS)))[start : start + TICKS]
-        nonsense = self.wanted.nonsense and rng.random() < 0.03
+        nonsense = rng.random() < self._nonsense
         if kind != "StatefulAction" and not nonsense:
             answers = answers.translate(rng.choice(_SYNCHRONOUS))
         elif nonsense:

@@ -7,7 +7,7 @@ import platform
 import random
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -58,6 +58,15 @@ BTCPP_WITH_ENGINE = _btcpp_wanted(engine_kinds())
 BTCPP_ALL = _btcpp_wanted(frozenset(SHAPES))
 
 
+def _batches(wanted: Wanted) -> Iterator[list[Tree]]:
+    """Trees for tests that wait for something to turn up: they take batches until it does, so that no seed is unlucky.
+
+    A few batches are enough for the rarest of it; fifty without it are a defect.
+    """
+    for first in range(0, 50 * 300, 300):
+        yield generate(SEED, wanted, range(first, first + 300))
+
+
 def _must_agree(report: Report, difference: Callable[[Tree], str | None]) -> None:
     if report.failures:
         tree, how = smallest_failure(report, difference)
@@ -103,8 +112,11 @@ def test_behaviortree_cpp_differs_by_the_rules_only(runner: Path, figure: Figure
 def test_every_rule_fires() -> None:
     wanted = Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False)
     fired: set[str] = set()
-    for tree in generate(SEED, wanted, range(1500)):
-        fired.update(*run_differing_model(tree).fired)
+    for trees in _batches(wanted):
+        for tree in trees:
+            fired.update(*run_differing_model(tree).fired)
+        if fired == set(RULES):
+            break
     assert fired == set(RULES)
 
 
@@ -117,13 +129,19 @@ def test_what_the_paper_defines(runner: Path) -> None:
 
 
 def test_the_trees_are_as_large_and_deep_as_promised() -> None:
-    trees = generate(SEED, Wanted(tuple(SHAPES)), range(1000))
-    sizes = [sum(1 for _ in tree.root.walk()) for tree in trees]
-    assert NODES_MAX * 0.9 < max(sizes) <= NODES_MAX
-    assert max(tree.root.depth() for tree in trees) == DEPTH_MAX
-    assert {kind for tree in trees for kind in tree.kinds()} == set(SHAPES)
-    for spec in (spec for tree in trees for spec in tree.root.walk()):
-        assert SHAPES[spec.kind].least <= len(spec.children) <= SHAPES[spec.kind].most
+    largest = deepest = 0
+    kinds: set[str] = set()
+    for trees in _batches(Wanted(tuple(SHAPES))):
+        largest = max(largest, *(sum(1 for _ in tree.root.walk()) for tree in trees))
+        deepest = max(deepest, *(tree.root.depth() for tree in trees))
+        kinds.update(*(tree.kinds() for tree in trees))
+        for spec in (spec for tree in trees for spec in tree.root.walk()):
+            assert SHAPES[spec.kind].least <= len(spec.children) <= SHAPES[spec.kind].most
+        if largest > NODES_MAX * 0.9 and deepest >= DEPTH_MAX and kinds == set(SHAPES):
+            break
+    assert NODES_MAX * 0.9 < largest <= NODES_MAX
+    assert deepest == DEPTH_MAX
+    assert kinds == set(SHAPES)
 
 
 # --- That the comparison can fail -------------------------------------------------------------------------------------
@@ -183,8 +201,9 @@ class LenientCondition(model.Condition):
 def test_a_wrong_model_is_found_out(runner: Path, wrong: type[Node]) -> None:
     kind = wrong.__mro__[1].__name__
     nodes = model.NODES | {kind: wrong}
-    report = compare_with_model(runner, generate(SEED, ENGINE, range(300)), lambda tree: run_model(tree, nodes))
-    assert report.failures
+    reports = (compare_with_model(runner, trees, lambda tree: run_model(tree, nodes)) for trees in _batches(ENGINE))
+    report = next((report for report in reports if report.failures), None)
+    assert report is not None, "it was not found out"
     tree, how = smallest_failure(
         report, lambda tree: engine_against_model(runner, tree, lambda tree: run_model(tree, nodes))
     )
@@ -198,10 +217,12 @@ def test_a_wrong_model_is_found_out(runner: Path, wrong: type[Node]) -> None:
     "kind", ["SequenceWithMemory", "KeepRunningUntilFailure", "Repeat", "RetryUntilSuccessful", "IfThenElse", "RunOnce"]
 )
 def test_without_its_rule_a_difference_is_found(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    trees = generate(SEED, Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False), range(400))
-    trees = [tree for tree in trees if can_load(tree) and kind in tree.kinds()]
     plain = type(kind, (differences.BtCppNode, model.NODES[kind]), {})
     monkeypatch.setitem(differences.NODES, kind, plain)
-    theirs = run_btcpp(trees)
-    explained = [run_differing_model(tree) for tree in trees]
-    assert any(ours.outcomes != outcomes for ours, (outcomes, _) in zip(explained, theirs, strict=True))
+
+    def differs(batch: list[Tree]) -> bool:
+        trees = [tree for tree in batch if can_load(tree) and kind in tree.kinds()]
+        explained = [run_differing_model(tree) for tree in trees]
+        return any(ours.outcomes != theirs for ours, (theirs, _) in zip(explained, run_btcpp(trees), strict=True))
+
+    assert any(differs(batch) for batch in _batches(Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False)))
