@@ -70,6 +70,10 @@ def _stack(results: dict[str, Any]) -> str:
     columns = results["cortex_m4"]
     keys = list(next(iter(columns.values()))["stack"])
     rows = [[_what(key), *(str(c["stack"][key]) for c in columns.values())] for key in keys]
+    worst = [c["worst_stack"] for c in columns.values()]
+    rows.append(
+        ["the worst node type, of all: ticked, abandoned, halted", *(f"{one['of']} {one['bytes']}" for one in worst)]
+    )
     return _table(["stack of a tick [bytes]", *columns], rows)
 
 
