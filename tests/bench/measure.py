@@ -79,7 +79,9 @@ def _cortex(folder: Path, say: Progress) -> dict[str, Any]:
             counts[f"{workload} {n}"] = round(tick.instructions / tick.leaf_calls, 2)
         stack = {f"{workload} {n}": tick_stack(program, workload, n) for workload, ns in STACK_ROWS for n in ns}
         say(f"{target.name}: the stack of every node type")
-        worst, of = max((stack, name) for name, stack in stack_of_types(program).items())
+        types = stack_of_types(program)
+        worst = max(types.values())
+        of = [name for name, most in types.items() if most == worst]
         results[target.name] = {"per_leaf": counts, "stack": stack, "worst_stack": {"bytes": worst, "of": of}}
     return results
 
