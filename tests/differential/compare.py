@@ -13,9 +13,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from differential.differences import Explained, run_differing_model, shown_alike
+from differential.differences import Explained, run_differing_model
 from differential.engine import run_engine
 from differential.model import run_model
+from differential.shown import shown_alike
 from differential.shrink import shrink
 from differential.tree import CALL_NAMES, ENTRIES, STATUS_NAMES, Outcome, Result, Tree, code_name
 
