@@ -178,17 +178,17 @@ static int32_t run_script(unsigned number)
         return run_script(0##number);                 \
     }
 #define NAMED(number) script_##number,
+/* clang-format off */
 #define EIGHT(each, n) each(n##0) each(n##1) each(n##2) each(n##3) each(n##4) each(n##5) each(n##6) each(n##7)
 #define SIXTY_FOUR(each, n) \
-    EIGHT(each, n##0)       \
-    EIGHT(each, n##1)       \
-    EIGHT(each, n##2) EIGHT(each, n##3) EIGHT(each, n##4) EIGHT(each, n##5) EIGHT(each, n##6) EIGHT(each, n##7)
-#define ALL(each)                                                                                                \
-    SIXTY_FOUR(each, 00)                                                                                         \
-    SIXTY_FOUR(each, 01)                                                                                         \
-    SIXTY_FOUR(each, 02) SIXTY_FOUR(each, 03) SIXTY_FOUR(each, 04) SIXTY_FOUR(each, 05) SIXTY_FOUR(each, 06)     \
-        SIXTY_FOUR(each, 07) SIXTY_FOUR(each, 10) SIXTY_FOUR(each, 11) SIXTY_FOUR(each, 12) SIXTY_FOUR(each, 13) \
-            SIXTY_FOUR(each, 14) SIXTY_FOUR(each, 15) SIXTY_FOUR(each, 16) SIXTY_FOUR(each, 17)
+    EIGHT(each, n##0) EIGHT(each, n##1) EIGHT(each, n##2) EIGHT(each, n##3) \
+    EIGHT(each, n##4) EIGHT(each, n##5) EIGHT(each, n##6) EIGHT(each, n##7)
+#define ALL(each) \
+    SIXTY_FOUR(each, 00) SIXTY_FOUR(each, 01) SIXTY_FOUR(each, 02) SIXTY_FOUR(each, 03) \
+    SIXTY_FOUR(each, 04) SIXTY_FOUR(each, 05) SIXTY_FOUR(each, 06) SIXTY_FOUR(each, 07) \
+    SIXTY_FOUR(each, 10) SIXTY_FOUR(each, 11) SIXTY_FOUR(each, 12) SIXTY_FOUR(each, 13) \
+    SIXTY_FOUR(each, 14) SIXTY_FOUR(each, 15) SIXTY_FOUR(each, 16) SIXTY_FOUR(each, 17)
+/* clang-format on */
 ALL(NUMBERED)
 static const canopy_script_t scripts[SCRIPTS_MAX] = {ALL(NAMED)};
 
