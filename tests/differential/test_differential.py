@@ -59,9 +59,9 @@ BTCPP = _btcpp_wanted(engine_kinds())
 def _batches(wanted: Wanted) -> Iterator[list[Tree]]:
     """Trees for tests that wait for something to turn up: they take batches until it does, so that no seed is unlucky.
 
-    A few batches are enough for the rarest of it; fifty without it are a defect.
+    The rarest of it is in one batch of eight; five hundred without it are a defect.
     """
-    for first in range(0, 50 * 300, 300):
+    for first in range(0, 500 * 300, 300):
         yield generate(SEED, wanted, range(first, first + 300))
 
 
