@@ -70,7 +70,8 @@ def bare_program(target: Target, folder: Path) -> Path:
     library = (LIBC / "string.c", "-fno-tree-loop-distribute-patterns", "-lgcc")
     link = ("-nostdlib", "-Wl,-e,canopy_tree_tick", "-Wl,-Ttext=0", "-Wl,-Tdata=0x20000000")
     engine = engine_object(target, folder)
-    run(*target.command, *COMMON, *link, HERE / "workloads.c", VALIDATOR, engine, *library, "-o", path)
+    sources = (HERE / "workloads.c", HERE / "stack.c", VALIDATOR)
+    run(*target.command, *COMMON, *link, *sources, engine, *library, "-o", path)
     return path
 
 

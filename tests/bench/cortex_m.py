@@ -70,6 +70,29 @@ class Core:
             self._machine.hook_del(hook)
         return Tick(instructions, self._word("bench_leaf_calls") - calls, STACK_TOP - lowest)
 
+    def build_stack(self, node_type: int, asked: bool) -> int:
+        """Calls bench_stack_build(). Returns the number of nodes."""
+        return self._call("bench_stack_build", node_type, int(asked))
+
+    def worst_stack(self, ticks: int, period_us: int) -> int:
+        """The most stack of so many ticks, and of a reset, which halts, after every fifth [bytes].
+
+        Looks at the stack pointer before each instruction.
+        """
+        lowest = STACK_TOP
+
+        def step(machine: unicorn.Uc, _address: int, _size: int, _data: object) -> None:
+            nonlocal lowest
+            lowest = min(lowest, machine.reg_read(arm_const.UC_ARM_REG_SP))
+
+        hook = self._machine.hook_add(unicorn.UC_HOOK_CODE, step)
+        for number in range(ticks):
+            self._call("canopy_tree_tick", self._symbols["bench_instance"], 0, number * period_us, 0)
+            if number % 5 == 4:
+                self._call("canopy_tree_reset", self._symbols["bench_instance"])
+        self._machine.hook_del(hook)
+        return STACK_TOP - lowest
+
     def _word(self, symbol: str) -> int:
         return int.from_bytes(self._machine.mem_read(self._symbols[symbol], 4), "little")
 

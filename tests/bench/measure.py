@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from canopy.compiler.node_types import node_types
+
 from . import build, cortex_m, instructions
 
 # Workload and n. Instructions per leaf on this machine.
@@ -36,6 +38,8 @@ STACK_ROWS = [
     ("halt_parallel", (2, 60)),
     ("halt_timeout", (2, 60)),
 ]
+# Ticks of the trees for the worst stack. The times of the nodes are 2 ms.
+STACK_TICKS, STACK_PERIOD_US = 100, 700
 WORKLOADS = [
     *("sequence", "fallback", "reactive", "reactive_running", "memory_running"),
     *("balanced", "inverters", "halt_reactive", "halt_parallel", "halt_timeout"),
@@ -74,8 +78,26 @@ def _cortex(folder: Path, say: Progress) -> dict[str, Any]:
             tick = core.tick(2000)
             counts[f"{workload} {n}"] = round(tick.instructions / tick.leaf_calls, 2)
         stack = {f"{workload} {n}": tick_stack(program, workload, n) for workload, ns in STACK_ROWS for n in ns}
-        results[target.name] = {"per_leaf": counts, "stack": stack}
+        say(f"{target.name}: the stack of every node type")
+        types = stack_of_types(program)
+        worst = max(types.values())
+        of = [name for name, most in types.items() if most == worst]
+        results[target.name] = {"per_leaf": counts, "stack": stack, "worst_stack": {"bytes": worst, "of": of}}
     return results
+
+
+def stack_of_types(program: Path) -> dict[str, int]:
+    """Node type -> the most stack that ticks and halts take in a tree with one such node [bytes]."""
+    worst = {}
+    for name, node_type in node_types().items():
+        stacks = []
+        for asked in (False, True):
+            core = cortex_m.Core(program)
+            if core.build_stack(node_type.number, asked) == 0:
+                raise RuntimeError(f"canopy_tree_validate() refuses the tree for the stack of {name}")
+            stacks.append(core.worst_stack(STACK_TICKS, STACK_PERIOD_US))
+        worst[name] = max(stacks)
+    return worst
 
 
 def tick_stack(program: Path, workload: str, n: int) -> int:

@@ -70,6 +70,11 @@ def _stack(results: dict[str, Any]) -> str:
     columns = results["cortex_m4"]
     keys = list(next(iter(columns.values()))["stack"])
     rows = [[_what(key), *(str(c["stack"][key]) for c in columns.values())] for key in keys]
+    worst = []
+    for column in columns.values():
+        most, of = column["worst_stack"]["bytes"], column["worst_stack"]["of"]
+        worst.append(f"{most} ({of[0] if len(of) == 1 else f'{len(of)} types'})")
+    rows.append(["all node types, ticked, abandoned and halted: the worst", *worst])
     return _table(["stack of a tick [bytes]", *columns], rows)
 
 

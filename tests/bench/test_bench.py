@@ -100,8 +100,19 @@ def test_the_stack_on_cortex_m_does_not_depend_on_depth(tmp_path: Path) -> None:
             assert shallow == deep <= 160, (target.name, workload)
 
 
+@pytest.mark.timeout(600)  # half a minute alone: every instruction is looked at
+def test_no_node_type_takes_more_stack_than_promised(tmp_path: Path) -> None:
+    for target in build.CORTEX_M4:
+        stacks = measure.stack_of_types(build.bare_program(target, tmp_path))
+        assert max(stacks.values()) <= 160, (target.name, stacks)
+
+
 def test_tables_have_a_cell_for_everything() -> None:
-    column = {"per_leaf": {"sequence 100": 22.0, "inverters 60000": 60001.0}, "stack": {"sequence 10": 48}}
+    column = {
+        "per_leaf": {"sequence 100": 22.0, "inverters 60000": 60001.0},
+        "stack": {"sequence 10": 48},
+        "worst_stack": {"bytes": 160, "of": ["Parallel"]},
+    }
     peer = {"version": "1", "per_leaf": {"sequence": 1.0}, "nanoseconds": {"sequence": 1.0}}
     sizes = {"flash_per_node": 12, "ram_per_node": 1, "ram_per_word": 2, "instance": 48}
     memory = {"sizes": sizes, "allocators": 0, "calls_outside": {"gcc": []}, "code_bytes": {"gcc": 1000}}

@@ -21,20 +21,29 @@ import behaviortreepy as bt
 from differential.generate import NODES_MAX
 from differential.tree import (
     CONTINUE,
+    ENTRIES,
     HALTED,
     IDLE,
+    SCRIPTED,
     START,
     STATUS_NAMES,
+    SWITCHED,
     USER_LEAVES,
     Outcome,
     Spec,
     Tree,
     attributes,
+    tag,
 )
 
 Answer = Callable[[int, int], object]
 _STATUSES = [getattr(bt.NodeStatus, name) for name in STATUS_NAMES]
 _NUMBERS = {name.encode(): number for number, name in enumerate(STATUS_NAMES)}
+_NOTHING_WRITTEN = (0,) * len(ENTRIES)
+# The entry of Switches is declared a text by the tree under test, so only a script can make it the number 0.
+_CLEAR = (
+    f'<root BTCPP_format="4"><BehaviorTree ID="Clear"><Script code="{ENTRIES[SWITCHED]} := 0"/></BehaviorTree></root>'
+)
 _CHANGE = re.compile(rb"\]: (\d+) .*-> \x1b\[\d+m([A-Z]+)\x1b")
 
 
@@ -46,6 +55,7 @@ class Runner:
         self.calls: list[tuple[int, int]] = []
         self.answers: dict[int, bytes] = {}
         self.tick_number = 0
+        self.blackboard: bt.Blackboard | None = None
         self.factory = bt.BehaviorTreeFactory()
         for number in range(NODES_MAX):
             start, go_on, halted = (self._function(number, kind) for kind in (START, CONTINUE, HALTED))
@@ -65,18 +75,21 @@ class Runner:
         self.answers = {}
         count = 0
 
-        def add(spec: Spec) -> None:
+        def add(spec: Spec, above: str = "") -> None:
             nonlocal count
             number = count
             count += 1
-            tag = spec.kind
-            if tag in USER_LEAVES:
-                tag += str(number)
+            if spec.kind == "Attributes":
+                add(spec.children[0], attributes(spec))
+                return
+            name = tag(spec)
+            if name in USER_LEAVES:
+                name += str(number)
                 self.answers[number] = spec.answers
-            parts.append(f'<{tag} name="{number}"{attributes(spec)}>')
+            parts.append(f'<{name} name="{number}"{attributes(spec)}{above}>')
             for child in spec.children:
                 add(child)
-            parts.append(f"</{tag}>")
+            parts.append(f"</{name}>")
 
         add(tree.root)
         self.codes = bytearray([IDLE] * count)
@@ -89,11 +102,23 @@ class Runner:
         os.ftruncate(self.log, 0)
         os.lseek(self.log, 0, os.SEEK_SET)
         calls, self.calls = self.calls, []
-        return Outcome(status, calls, bytes(self.codes))
+        entries = tuple(map(self.blackboard.get_int, ENTRIES)) if self.blackboard else _NOTHING_WRITTEN
+        return Outcome(status, calls, bytes(self.codes), entries)
+
+    def _create(self, tree: Tree) -> bt.Tree:
+        self.blackboard = None
+        if not tree.kinds() & SCRIPTED:
+            return self.factory.create_tree_from_text(self._xml(tree))
+        self.blackboard = bt.Blackboard.create()
+        for name in ENTRIES[:SWITCHED]:
+            self.blackboard.set_int(name, 0)
+        running = self.factory.create_tree_from_text(self._xml(tree), self.blackboard)
+        self.factory.create_tree_from_text(_CLEAR, self.blackboard).tick_exactly_once()
+        return running
 
     def run(self, tree: Tree) -> tuple[list[Outcome], str]:
         """The outcomes of one tree, up to an exception, and what the exception said."""
-        running = self.factory.create_tree_from_text(self._xml(tree))
+        running = self._create(tree)
         logger = bt.StdCoutLogger(running)
         outcomes: list[Outcome] = []
         thrown = ""

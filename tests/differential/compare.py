@@ -8,22 +8,24 @@ import pickle
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from differential.differences import Explained, run_differing_model, shown_alike
+from differential.differences import Explained, run_differing_model
 from differential.engine import run_engine
 from differential.model import run_model
+from differential.shown import shown_alike
 from differential.shrink import shrink
-from differential.tree import CALL_NAMES, STATUS_NAMES, Outcome, Result, Tree, code_name, engine_kinds
+from differential.tree import CALL_NAMES, ENTRIES, STATUS_NAMES, Outcome, Result, Tree, code_name
 
 BATCH = 500
 
 
 @dataclass
 class Report:
-    """What was compared. `direct`: ticks of BehaviorTree.CPP compared with the engine (or the model) itself."""
+    """What was compared. `direct`: ticks of BehaviorTree.CPP compared with the engine itself."""
 
     trees: int = 0
     ticks: int = 0
@@ -40,7 +42,8 @@ def outcome_text(outcome: Outcome) -> str:
     else:
         head = STATUS_NAMES[outcome.status] if outcome.status < len(STATUS_NAMES) else f"status {outcome.status}"
     calls = ", ".join(f"{node} {CALL_NAMES[kind]}" for node, kind in outcome.calls)
-    return f"{head}; calls: {calls or 'none'}; nodes: {', '.join(map(code_name, outcome.codes))}"
+    entries = ", ".join(f"{name} {value}" for name, value in zip(ENTRIES, outcome.entries, strict=True))
+    return f"{head}; calls: {calls or 'none'}; nodes: {', '.join(map(code_name, outcome.codes))}; entries: {entries}"
 
 
 def first_difference(named: dict[str, list[Outcome]]) -> str | None:
@@ -113,7 +116,8 @@ def _directly_compared(tree: Tree, explained: Explained, ours: list[Outcome], th
     for number, (our, their) in enumerate(zip(ours, theirs, strict=False)):
         if explained.fired[number]:
             return number
-        alike = our.status == their.status and our.calls == their.calls and shown_alike(tree, our, their)
+        alike = our.status == their.status and our.calls == their.calls and our.entries == their.entries
+        alike = alike and shown_alike(tree, our, their)
         if not alike:
             return (
                 f"outcome {number}, no rule fired:\n  engine: {outcome_text(our)}\n"
@@ -123,14 +127,25 @@ def _directly_compared(tree: Tree, explained: Explained, ours: list[Outcome], th
 
 
 def compare_with_btcpp(runner: Path, trees: list[Tree], differing: Differing = run_differing_model) -> Report:
-    """Runs trees in BehaviorTree.CPP, the differing model, and the engine (the model where it lacks a node)."""
+    """Runs trees in BehaviorTree.CPP, the differing model, and the engine."""
     report = Report()
-    for begin in range(0, len(trees), BATCH):
-        batch = trees[begin : begin + BATCH]
-        for_engine = [tree for tree in batch if tree.kinds() <= engine_kinds()]
-        engine = iter(run_engine(runner, for_engine))
-        for tree, (theirs, thrown) in zip(batch, run_btcpp(batch), strict=True):
-            ours = (next(engine) if tree.kinds() <= engine_kinds() else run_model(tree)).outcomes
+    batches = [trees[begin : begin + BATCH] for begin in range(0, len(trees), BATCH)]
+    with ThreadPoolExecutor(2) as ahead:  # BehaviorTree.CPP runs the next trees while these are looked at
+        results = ahead.map(run_btcpp, batches)
+        _add_batches(report, runner, batches, results, differing)
+    return report
+
+
+def _add_batches(
+    report: Report,
+    runner: Path,
+    batches: list[list[Tree]],
+    results: Iterator[list[tuple[list[Outcome], str]]],
+    differing: Differing,
+) -> None:
+    for batch, result in zip(batches, results, strict=True):
+        for tree, engine, (theirs, thrown) in zip(batch, run_engine(runner, batch), result, strict=True):
+            ours = engine.outcomes
             explained = differing(tree)
             report.trees += 1
             report.ticks += len(theirs)
@@ -146,7 +161,6 @@ def compare_with_btcpp(runner: Path, trees: list[Tree], differing: Differing = r
                 report.failures.append((tree, difference))
             elif isinstance(compared, int):
                 report.direct += compared
-    return report
 
 
 # --- What a failure says ----------------------------------------------------------------------------------------------

@@ -9,10 +9,11 @@ tick in which a rule fired, the engine has to give the same as BehaviorTree.CPP,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from differential import model
 from differential.model import COMPLETED, ModelTree, Node, World
-from differential.tree import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, WAS, Outcome, Spec, Tree
+from differential.tree import ATTRIBUTES, FAILURE, IDLE, RUNNING, SKIPPED, Outcome, Tree
 
 RULES: dict[str, str] = {
     "skipped condition": "IfThenElse and WhileDoElse throw when their condition is SKIPPED",
@@ -23,9 +24,13 @@ RULES: dict[str, str] = {
     "memory yields": "SequenceWithMemory yields after every child that completes in the tick it was started in",
     "skipped count": "a SKIPPED Repeat or RetryUntilSuccessful is RUNNING there, and loses its count at other times",
     "skipped action": "a RUNNING action that answers SKIPPED stays RUNNING there",
+    "attributes": "preconditions are asked of what is IDLE there: not of a SKIPPED inner node, nor of an old condition",
+    "precondition": "Precondition does not ask again after a SKIPPED child or a halt, until its child has completed",
+    "loop goes on": "a Loop that was SKIPPED, or completed and was not reset, does not start its list again",
+    "on halted": "halting the whole tree runs every _onHalted, also of nodes that are not RUNNING",
     "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped then",
 }
-"""The differences that change what happens. What only looks different is in shown_alike()."""
+"""The differences that change what happens. What only looks different is in shown.py."""
 
 
 class ThrownError(Exception):
@@ -45,17 +50,18 @@ class BtCppWorld(World):
 
 
 class BtCppNode(Node):
-    """SKIPPED is not stored: a leaf stays what it was, and an inner node stays RUNNING."""
+    """SKIPPED is not stored: a leaf stays what it was, and most inner nodes stay RUNNING."""
 
     world: BtCppWorld
     was_skipped = False
+    runs_when_skipped: ClassVar[bool] = True
 
     def tick(self) -> int:
         status = self.tick_children()
         self.was_skipped = status == SKIPPED
         if status != SKIPPED:
             self.code = status
-        elif self.children:
+        elif self.children and self.runs_when_skipped:
             self.code = RUNNING
         return status
 
@@ -63,6 +69,21 @@ class BtCppNode(Node):
         if self.code == RUNNING:
             self.on_halt()
         self.code = IDLE
+
+    def keeps_count(self, skipped: list[Node]) -> None:
+        """The node does not reset these children."""
+        if any(isinstance(node, Counting) and node.cycles for node in map(bare, skipped)):
+            self.world.differs("skipped count")
+
+
+def was_skipped(node: Node) -> bool:
+    """Whether it answered SKIPPED the last time."""
+    return isinstance(node, BtCppNode) and node.was_skipped
+
+
+def bare(node: Node) -> Node:
+    """The node itself, where Attributes stand above it."""
+    return node.children[0] if isinstance(node, Attributes) else node
 
 
 class Condition(BtCppNode, model.Condition):
@@ -170,7 +191,10 @@ class Remembering(BtCppNode, model.Remembering):
     """One that is SKIPPED does not reset its children. This is only shown."""
 
     def complete(self, status: int) -> int:
-        return status if status == SKIPPED else super().complete(status)
+        if status != SKIPPED:
+            return super().complete(status)
+        self.keeps_count(self.children)
+        return SKIPPED
 
 
 class Parallel(Remembering, model.Parallel):
@@ -183,7 +207,11 @@ class ParallelAll(Remembering, model.ParallelAll):
 
 class IfThenElse(BtCppNode, model.IfThenElse):
     def tick_children(self) -> int:
-        if self.branch == 0 and isinstance(self.children[0], StatefulAction) and self.children[0].code in COMPLETED:
+        if (
+            self.branch == 0
+            and isinstance(bare(self.children[0]), StatefulAction)
+            and self.children[0].code in COMPLETED
+        ):
             self.world.differs("no else")
         return super().tick_children()
 
@@ -198,7 +226,7 @@ class IfThenElse(BtCppNode, model.IfThenElse):
 
 class WhileDoElse(BtCppNode, model.WhileDoElse):
     def tick_children(self) -> int:
-        if isinstance(self.children[0], StatefulAction) and self.children[0].code in COMPLETED:
+        if isinstance(bare(self.children[0]), StatefulAction) and self.children[0].code in COMPLETED:
             self.world.differs("while")
         return super().tick_children()
 
@@ -208,13 +236,15 @@ class WhileDoElse(BtCppNode, model.WhileDoElse):
 
 
 class Decorator(BtCppNode, model.Decorator):
+    def child_runs(self) -> bool:
+        return super().child_runs() and not was_skipped(self.children[0])
+
     def tick_child(self) -> int:
-        child = self.children[0]
-        status = child.tick()
+        status = self.children[0].tick()
         if status in COMPLETED:
             self.reset_all()
-        elif status == SKIPPED and isinstance(child, Counting) and child.cycles:
-            self.world.differs("skipped count")
+        elif status == SKIPPED:
+            self.keeps_count(self.children)
         return status
 
 
@@ -265,6 +295,95 @@ class KeepRunningUntilFailure(Decorator, model.KeepRunningUntilFailure):
         return RUNNING
 
 
+class Script(BtCppNode, model.Script):
+    pass
+
+
+class SetBlackboard(BtCppNode, model.SetBlackboard):
+    pass
+
+
+class ScriptCondition(BtCppNode, model.ScriptCondition):
+    pass
+
+
+class Precondition(Decorator, model.Precondition):
+    """Once it has let its child be ticked, it does so until that has completed."""
+
+    runs_when_skipped = False
+    is_open = False
+
+    def tick_children(self) -> int:
+        holds = self.world.run(self.spec.scripts[0])
+        if self.is_open and not holds and not self.child_runs():
+            self.world.differs("precondition")
+        if not self.is_open and not holds:
+            return self.spec.parameters[0]
+        status = self.tick_child()
+        self.is_open = status not in COMPLETED
+        return status
+
+
+class Loop(Decorator, model.Loop):
+    def starts(self) -> bool:
+        if self.code in COMPLETED or (self.code == RUNNING and self.was_skipped):
+            self.world.differs("loop goes on")
+        return self.code == IDLE
+
+
+class Switch(BtCppNode, model.Switch):
+    """Does not reset a child that was SKIPPED, until another one completes. This is only shown."""
+
+    runs_when_skipped = False
+
+    def begin(self) -> None:
+        self.running: Node | None = None
+
+    def tick_children(self) -> int:
+        child = self.children[self.case()]
+        if self.running is not None and self.running is not child:
+            self.running.reset()
+        status = child.tick()
+        self.running = child if status == RUNNING else None
+        if status == SKIPPED:
+            self.keeps_count([child])
+        if status in COMPLETED:
+            self.reset_all()
+        return status
+
+
+class Attributes(BtCppNode, model.Attributes):
+    """There no node of its own: what it has to say becomes the status of the node below."""
+
+    def tick(self) -> int:
+        child = self.children[0]
+        if child.code in COMPLETED or (child.code == RUNNING and was_skipped(child)):
+            self.world.differs("attributes")
+        status = None if child.code in COMPLETED else self.precondition()
+        if status is None:
+            status = child.tick()
+        elif status in COMPLETED:
+            child.code = status
+        self.completed(status)
+        self.code = child.code
+        self.was_skipped = status == SKIPPED
+        return status
+
+    def reset(self) -> None:
+        child = self.children[0]
+        if child.code == RUNNING:
+            if was_skipped(child):
+                self.world.differs("attributes")
+            self.halt_node()
+        child.reset()
+        self.code = IDLE
+
+    def halt_node(self) -> None:
+        self.children[0].reset()
+        self.code = IDLE
+        self.run("_onHalted")
+
+
 class RunOnce(Decorator, model.RunOnce):
     def tick(self) -> int:
         before = self.code
@@ -282,10 +401,12 @@ NODES: dict[str, type[Node]] = {
         Sequence, SequenceWithMemory, AsyncSequence, ReactiveSequence, Fallback, AsyncFallback, ReactiveFallback,
         Parallel, ParallelAll, IfThenElse, WhileDoElse,
         Inverter, ForceSuccess, ForceFailure, Repeat, RetryUntilSuccessful, KeepRunningUntilFailure, RunOnce,
+        Script, ScriptCondition, SetBlackboard, Precondition, Attributes, Loop, Switch,
     )
 }  # fmt: skip
 """The kinds of nodes that can be compared. It has no ReactiveParallel, and cannot be given a clock (Delay, Timeout,
-Sleep); TryCatch is newer (4.9) than what behaviortreepy holds (4.8.2)."""
+Sleep); TryCatch is newer (4.9) than what behaviortreepy holds (4.8.2). SkipUnlessUpdated, WaitValueUpdate and
+WasEntryUpdated forget there what they have seen when they are halted, and the first two do not halt their child."""
 
 
 @dataclass
@@ -297,10 +418,30 @@ class Explained:
     fired: list[set[str]]
 
 
+class BtCppTree(ModelTree):
+    """Halts every node when the whole tree is halted, RUNNING or not."""
+
+    world: BtCppWorld
+
+    def halt(self) -> Outcome:
+        for node in (self.root, *self.nodes):
+            if not isinstance(node, Attributes):
+                node.reset()
+                continue
+            if node.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None:
+                self.world.differs("on halted")
+            node.halt_node()
+        return self._outcome(None)
+
+
+def _shown_codes(differing: ModelTree) -> bytes:
+    return bytes([IDLE if isinstance(node, Attributes) else node.code for node in differing.nodes])
+
+
 def run_differing_model(tree: Tree) -> Explained:
     """Runs the reference model with BehaviorTree.CPP's differences, up to an exception."""
     world = BtCppWorld()
-    differing = ModelTree(tree, world, NODES)
+    differing = BtCppTree(tree, world, NODES)
     explained = Explained([], False, [])
     for number in range(len(tree.times)):
         try:
@@ -311,56 +452,15 @@ def run_differing_model(tree: Tree) -> Explained:
             return explained
         if outcome.status in COMPLETED:  # then BehaviorTree.CPP resets the root
             differing.root.code = IDLE
-            outcome = outcome._replace(codes=bytes([IDLE]) + outcome.codes[1:])
-        explained.outcomes.append(outcome)
+            bare(differing.root).code = IDLE
+        explained.outcomes.append(outcome._replace(codes=_shown_codes(differing)))
         explained.fired.append(world.fired)
         world.fired = set()
         if tree.halt_after == number + 1:
-            explained.outcomes.append(differing.halt())
+            explained.outcomes.append(differing.halt()._replace(codes=_shown_codes(differing)))
             explained.fired.append(world.fired)
             world.fired = set()
     return explained
-
-
-def shown_alike(tree: Tree, ours: Outcome, theirs: Outcome) -> bool:
-    """Whether the engine and BehaviorTree.CPP show the same statuses after a tick, but for how it shows them.
-
-    The differences that only are shown: it resets a completed root; it does not store SKIPPED; a reactive node resets
-    what it has ticked before the RUNNING child; a SequenceWithMemory that fails does not reset the children before; a
-    two-child IfThenElse does not reset its condition after a FAILURE.
-    """
-    parents: list[Spec | None] = []
-    specs: list[Spec] = []
-
-    def number(spec: Spec, parent: Spec | None) -> None:
-        specs.append(spec)
-        parents.append(parent)
-        for child in spec.children:
-            number(child, spec)
-
-    number(tree.root, None)
-    return all(
-        _alike(spec, parent, our, their)
-        for spec, parent, our, their in zip(specs, parents, ours.codes, theirs.codes, strict=True)
-    )
-
-
-def _alike(spec: Spec, parent: Spec | None, ours: int, theirs: int) -> bool:
-    if (IDLE if ours >= WAS else ours) == theirs:
-        return True
-    if parent is None and ours in COMPLETED and theirs == IDLE:
-        return True
-    if ours == SKIPPED or ours == WAS + SKIPPED:
-        return theirs in ((IDLE, RUNNING) if spec.children else (IDLE, SKIPPED))
-    if parent is None:
-        return False
-    if parent.kind in ("ReactiveSequence", "ReactiveFallback"):
-        return ours in (SUCCESS, FAILURE) and theirs == IDLE
-    if parent.kind == "SequenceWithMemory":
-        return ours == WAS + theirs
-    if parent.kind == "IfThenElse" and len(parent.children) == 2 and spec is parent.children[0]:
-        return ours == WAS + FAILURE and theirs == FAILURE
-    return False
 
 
 def can_load(tree: Tree) -> bool:

@@ -8,12 +8,29 @@ import subprocess
 from pathlib import Path
 
 from canopy.compiler.node_types import node_types
-from differential.tree import IDLE, SHAPES, USER_LEAVES, WAS, Outcome, Result, Spec, Tree
+from differential.tree import (
+    ENTRIES,
+    IDLE,
+    OPERATIONS,
+    SCRIPT_LEAVES,
+    SHAPES,
+    USER_LEAVES,
+    WAS,
+    Outcome,
+    Result,
+    Script,
+    Spec,
+    Tree,
+)
 
-_HEADER = struct.Struct("<6H")
+_HEADER = struct.Struct("<7H")
 _NODE = struct.Struct("<2B5H")
+_SCRIPT = struct.Struct("<BBhH")
+_ENTRIES = struct.Struct(f"<{len(ENTRIES)}i")
 _CALL = struct.Struct("<HB")
 NO_HALT = 0xFFFF
+# The types of the leaves that the compiler makes of these.
+_AS_LEAF = {"Script": "SyncAction", "SetBlackboard": "SyncAction", "ScriptCondition": "Condition"}
 # "IDLE, was IDLE" is IDLE: both mean that the node has not returned anything yet.
 _CODES = bytes(IDLE if code == WAS + IDLE else code for code in range(256))
 
@@ -30,6 +47,7 @@ class _Packer:
         self.rows = bytearray()
         self.parameters: list[int] = []
         self.answers: list[bytes] = []
+        self.scripts: list[bytes] = []
         self.words = 0
         self.count = 0
         self.rows += self._rows(tree.root, 0)
@@ -37,16 +55,19 @@ class _Packer:
         halt = NO_HALT if tree.halt_after is None else tree.halt_after
         self.packed = b"".join(
             (
-                _HEADER.pack(self.count, len(self.answers), len(self.parameters), self.words, ticks, halt),
+                _HEADER.pack(
+                    self.count, len(self.answers), len(self.parameters), len(self.scripts), self.words, ticks, halt
+                ),
                 self.rows,
                 struct.pack(f"<{len(self.parameters)}i", *self.parameters),
                 struct.pack(f"<{ticks}Q", *tree.times),
+                *self.scripts,
                 *self.answers,
             )
         )
 
     def _rows(self, spec: Spec, parent: int) -> bytes:
-        kind = self.types[spec.kind]
+        kind = self.types[_AS_LEAF.get(spec.kind, spec.kind)]
         number = self.count
         self.count += 1
         state, leaf, parameter = self.words, 0, 0
@@ -54,13 +75,25 @@ class _Packer:
         if spec.kind in USER_LEAVES:
             leaf, parameter = USER_LEAVES.index(spec.kind), len(self.answers)
             self.answers.append(struct.pack("<H", number) + spec.answers)
-        elif spec.parameters:
+        elif spec.kind in SCRIPT_LEAVES:
+            leaf, parameter = len(USER_LEAVES) + (spec.kind == "ScriptCondition"), self._script(number, spec.scripts[0])
+        elif spec.parameters or spec.scripts:
             parameter = len(self.parameters)
-            values = dict(zip(SHAPES[spec.kind].parameters, spec.parameters, strict=True))
+            shape = SHAPES[spec.kind]
+            values = dict(zip(shape.parameters, spec.parameters, strict=True))
+            for name, script in zip(shape.scripts, spec.scripts, strict=True):
+                values[name] = self._script(number, script)
             self.parameters += [values.pop(entry.name) for entry in kind.parameters]
             assert not values, f"nodes.def knows no parameter {values} of {spec.kind}"
         below = b"".join(self._rows(child, number) for child in spec.children)
         return _NODE.pack(kind.number, 0, parent, self.count, state, leaf, parameter) + below
+
+    def _script(self, node: int, script: Script | None) -> int:
+        """Its number; -1 for none."""
+        if script is None:
+            return -1
+        self.scripts.append(_SCRIPT.pack(OPERATIONS.index(script.operation), script.entry, script.value, node))
+        return len(self.scripts) - 1
 
 
 def _read(output: bytes, offset: int, tree: Tree) -> tuple[Result, int]:
@@ -76,8 +109,10 @@ def _read(output: bytes, offset: int, tree: Tree) -> tuple[Result, int]:
         end = offset + 3 * calls
         log = list(_CALL.iter_unpack(output[offset:end]))
         is_halt = tree.halt_after == number
-        outcomes.append(Outcome(None if is_halt else status, log, output[end : end + nodes].translate(_CODES)))
-        offset = end + nodes
+        codes = output[end : end + nodes].translate(_CODES)
+        entries = _ENTRIES.unpack_from(output, end + nodes)
+        outcomes.append(Outcome(None if is_halt else status, log, codes, entries))
+        offset = end + nodes + _ENTRIES.size
     faults, fault_node = struct.unpack_from("<IH", output, offset)
     return Result(outcomes, faults, fault_node), offset + 6
 

@@ -8,7 +8,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
-from differential.tree import BUILT_IN_LEAVES, FAILURE, RUNNING, SHAPES, SKIPPED, SUCCESS, USER_LEAVES, Spec, Tree
+from differential.tree import (
+    ASSIGNMENTS,
+    BUILT_IN_LEAVES,
+    COMPARISONS,
+    ENTRIES,
+    FAILURE,
+    PRECONDITIONS,
+    RUNNING,
+    SCRIPTED,
+    SHAPES,
+    SKIPPED,
+    SUCCESS,
+    SWITCHED,
+    USER_LEAVES,
+    Script,
+    Spec,
+    Tree,
+)
 
 NODES_MAX = 200
 DEPTH_MAX = 30
@@ -25,7 +42,7 @@ class Wanted:
 
     kinds: tuple[str, ...]
     nonsense: bool = True
-    """Leaves that answer with no valid status, or RUNNING where it is not allowed."""
+    """Leaves that answer with no valid status, or RUNNING where it may not be: in some trees none, in others many."""
     odd_times: bool = True
     """Times that stand still, wrap around, or go back."""
     seldom: tuple[str, ...] = ()
@@ -79,13 +96,19 @@ class Generator:
         self.wanted = wanted
         kinds = wanted.kinds
         # The user's leaves are most of what robots have; the rest keeps the built-in ones company.
-        self._leaves = [kind for kind in USER_LEAVES if kind in kinds] * 2
-        self._leaves += ["StatefulAction"] * 3 + [kind for kind in BUILT_IN_LEAVES if kind in kinds]
+        self._plain_leaves = [kind for kind in USER_LEAVES if kind in kinds] * 2 + ["StatefulAction"] * 3
+        self._plain_leaves += [kind for kind in BUILT_IN_LEAVES if kind in kinds and kind not in SCRIPTED]
+        self._script_leaves = [kind for kind in BUILT_IN_LEAVES if kind in kinds and kind in SCRIPTED]
 
     def _choose_kinds(self) -> None:
         """Which kinds this tree is made of: now all of them, now a few, so that each meets itself, too."""
         rng = self._rng
         kinds = [kind for kind in self.wanted.kinds if kind not in self.wanted.seldom or rng.random() < 0.25]
+        if rng.random() < 0.6:
+            kinds = [kind for kind in kinds if kind not in SCRIPTED]
+            self._leaves = self._plain_leaves
+        else:
+            self._leaves = self._plain_leaves + self._script_leaves * 2
         inner = [kind for kind in kinds if SHAPES[kind].most > 0]
         if rng.random() < 0.5:
             inner = rng.sample(inner, min(len(inner), 5))
@@ -100,6 +123,7 @@ class Generator:
         self._rng = rng
         self._decorated = rng.choice((0.1, 0.3, 0.3, 0.7))
         self._slanted = rng.random() < 0.4
+        self._nonsense = rng.choice((0.0, 0.03, 0.1, 0.3)) if self.wanted.nonsense else 0.0
         self._choose_kinds()
         root = self._node(size, depth)
         halt_after = rng.randrange(1, TICKS) if rng.random() < 0.3 else None
@@ -133,7 +157,9 @@ class Generator:
         if kind in ("IfThenElse", "WhileDoElse") and not self.wanted.conditions_skip:
             for spec in children[0].walk():
                 spec.answers = spec.answers.translate(_NEVER_SKIPPED)
-        return Spec(kind, children, self._parameters(kind, children))
+        if kind == "Attributes" and children[0].kind == "Attributes":
+            return children[0]
+        return Spec(kind, children, self._parameters(kind, children), b"", self._scripts(kind))
 
     def _parts(self, kind: str, size: int) -> list[int]:
         """Sizes of the children of a control node that has `size` nodes below it."""
@@ -152,10 +178,10 @@ class Generator:
         rng = self._rng
         kind = rng.choice(self._leaves)
         if kind not in USER_LEAVES:
-            return Spec(kind, [], self._parameters(kind, []))
+            return Spec(kind, [], self._parameters(kind, []), b"", self._scripts(kind))
         start = rng.randrange(_POOL - TICKS)
         answers = _answers(rng.randrange(len(_MOODS)))[start : start + TICKS]
-        nonsense = self.wanted.nonsense and rng.random() < 0.03
+        nonsense = rng.random() < self._nonsense
         if kind != "StatefulAction" and not nonsense:
             answers = answers.translate(rng.choice(_SYNCHRONOUS))
         elif nonsense:
@@ -163,6 +189,26 @@ class Generator:
         if not self.wanted.running_skips:
             answers = answers.replace(_RUNNING_SKIPS, bytes((RUNNING, FAILURE)))
         return Spec(kind, [], (), answers)
+
+    def _scripts(self, kind: str) -> tuple[Script | None, ...]:
+        return tuple(self._script(kind, name) for name in SHAPES[kind].scripts)
+
+    def _script(self, kind: str, name: str) -> Script | None:
+        rng = self._rng
+        entry, value = rng.randrange(len(ENTRIES)), rng.randint(-1, 3)
+        if kind == "Attributes" and rng.random() < 0.7:
+            return None
+        if name in ("if", *PRECONDITIONS) or kind == "ScriptCondition":
+            return Script(rng.choice(COMPARISONS), entry, value)
+        if kind == "Switch":
+            return Script("value", SWITCHED)
+        if name == "entry":
+            return Script("updates", entry)
+        if kind == "Loop":
+            return Script("take", rng.randrange(SWITCHED), rng.randint(1, 4))
+        if kind == "SetBlackboard":
+            return Script(":=", rng.randrange(SWITCHED), value)
+        return Script(rng.choice(ASSIGNMENTS), entry, value)
 
     def _parameters(self, kind: str, children: list[Spec]) -> tuple[int, ...]:
         return tuple(self._parameter(kind, name, children) for name in SHAPES[kind].parameters)
@@ -184,6 +230,8 @@ class Generator:
             return rng.randint(0, 1)
         if name in ("msec", "delay_msec"):
             return rng.choice(_MSEC)
+        if name in ("else", "if_empty"):
+            return rng.choice((SUCCESS, FAILURE, SKIPPED) + (RUNNING,) * (name == "else"))
         raise ValueError(f"no values known for the parameter {name} of {kind}")
 
 

@@ -34,6 +34,9 @@ def _smaller(spec: Spec, ticks: int) -> Iterator[Spec]:
     for index, child in enumerate(spec.children):
         for smaller in _smaller(child, ticks):
             yield _with_children(spec, [*spec.children[:index], smaller, *spec.children[index + 1 :]])
+    for index, script in enumerate(spec.scripts):
+        if script is not None and spec.kind == "Attributes":
+            yield replace(spec, scripts=(*spec.scripts[:index], None, *spec.scripts[index + 1 :]))
     for index, answer in enumerate(spec.answers):
         if answer != SUCCESS:
             yield replace(spec, answers=spec.answers[:index] + bytes([SUCCESS]) + spec.answers[index + 1 :])

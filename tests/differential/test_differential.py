@@ -7,7 +7,7 @@ import platform
 import random
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -53,9 +53,16 @@ def _btcpp_wanted(kinds: frozenset[str]) -> Wanted:
     )
 
 
-# What the engine has, and all that can be compared: the same once the engine is whole.
-BTCPP_WITH_ENGINE = _btcpp_wanted(engine_kinds())
-BTCPP_ALL = _btcpp_wanted(frozenset(SHAPES))
+BTCPP = _btcpp_wanted(engine_kinds())
+
+
+def _batches(wanted: Wanted) -> Iterator[list[Tree]]:
+    """Trees for tests that wait for something to turn up: they take batches until it does, so that no seed is unlucky.
+
+    The rarest of it is in one batch of eight; five hundred without it are a defect.
+    """
+    for first in range(0, 500 * 300, 300):
+        yield generate(SEED, wanted, range(first, first + 300))
 
 
 def _must_agree(report: Report, difference: Callable[[Tree], str | None]) -> None:
@@ -83,16 +90,14 @@ def test_the_engine_does_what_the_model_says(runner: Path, figure: Figure) -> No
 
 @needs_btcpp
 @pytest.mark.timeout(TIMEOUT_S)
-@pytest.mark.parametrize(
-    ("name", "wanted"), [("BehaviorTree.CPP and engine", BTCPP_WITH_ENGINE), ("BehaviorTree.CPP and model", BTCPP_ALL)]
-)
-def test_behaviortree_cpp_differs_by_the_rules_only(runner: Path, figure: Figure, name: str, wanted: Wanted) -> None:
+def test_behaviortree_cpp_differs_by_the_rules_only(runner: Path, figure: Figure) -> None:
     begin = time.monotonic()
-    trees = [tree for tree in generate(SEED, wanted, range(BTCPP_TREES // 2)) if can_load(tree)]
+    trees = [tree for tree in generate(SEED, BTCPP, range(BTCPP_TREES)) if can_load(tree)]
     report = compare_with_btcpp(runner, trees)
     _must_agree(report, lambda tree: next((how for _, how in compare_with_btcpp(runner, [tree]).failures), None))
     figure(
-        f"{name}: {report.trees} trees, {report.ticks} ticks and halts all explained; {report.direct} of them "
+        f"BehaviorTree.CPP and engine: {report.trees} trees, {report.ticks} ticks and halts all explained; "
+        f"{report.direct} of them "
         f"({100 * report.direct / report.ticks:.1f} %) the same, the rest come after a rule fired; "
         f"{report.thrown} trees ended by an exception; {time.monotonic() - begin:.1f} s"
     )
@@ -101,10 +106,13 @@ def test_behaviortree_cpp_differs_by_the_rules_only(runner: Path, figure: Figure
 
 
 def test_every_rule_fires() -> None:
-    wanted = Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False)
+    wanted = Wanted(BTCPP.kinds, nonsense=False, odd_times=False)
     fired: set[str] = set()
-    for tree in generate(SEED, wanted, range(1500)):
-        fired.update(*run_differing_model(tree).fired)
+    for trees in _batches(wanted):
+        for tree in trees:
+            fired.update(*run_differing_model(tree).fired)
+        if fired == set(RULES):
+            break
     assert fired == set(RULES)
 
 
@@ -117,13 +125,19 @@ def test_what_the_paper_defines(runner: Path) -> None:
 
 
 def test_the_trees_are_as_large_and_deep_as_promised() -> None:
-    trees = generate(SEED, Wanted(tuple(SHAPES)), range(1000))
-    sizes = [sum(1 for _ in tree.root.walk()) for tree in trees]
-    assert NODES_MAX * 0.9 < max(sizes) <= NODES_MAX
-    assert max(tree.root.depth() for tree in trees) == DEPTH_MAX
-    assert {kind for tree in trees for kind in tree.kinds()} == set(SHAPES)
-    for spec in (spec for tree in trees for spec in tree.root.walk()):
-        assert SHAPES[spec.kind].least <= len(spec.children) <= SHAPES[spec.kind].most
+    largest = deepest = 0
+    kinds: set[str] = set()
+    for trees in _batches(Wanted(tuple(SHAPES))):
+        largest = max(largest, *(sum(1 for _ in tree.root.walk()) for tree in trees))
+        deepest = max(deepest, *(tree.root.depth() for tree in trees))
+        kinds.update(*(tree.kinds() for tree in trees))
+        for spec in (spec for tree in trees for spec in tree.root.walk()):
+            assert SHAPES[spec.kind].least <= len(spec.children) <= SHAPES[spec.kind].most
+        if largest > NODES_MAX * 0.9 and deepest >= DEPTH_MAX and kinds == set(SHAPES):
+            break
+    assert NODES_MAX * 0.9 < largest <= NODES_MAX
+    assert deepest == DEPTH_MAX
+    assert kinds == set(SHAPES)
 
 
 # --- That the comparison can fail -------------------------------------------------------------------------------------
@@ -171,6 +185,54 @@ class TwiceHalted(model.StatefulAction):
         self.world.calls += [(self.number, HALTED)] * 2
 
 
+class LatePrecondition(model.Precondition):
+    """Asks also while the child is RUNNING."""
+
+    def child_runs(self) -> bool:
+        return False
+
+
+class UnheardHalt(model.Attributes):
+    """Does not run _onHalted when it is halted from above."""
+
+    def on_halt(self) -> None:
+        self.reset_all()
+
+
+class LateWhile(model.Attributes):
+    """Does not ask _while of a RUNNING node."""
+
+    def precondition(self) -> int | None:
+        return None if self.child_runs() else super().precondition()
+
+
+class EndlessNews(model.SkipUnlessUpdated):
+    """Does not remember what it has seen."""
+
+    def is_new(self) -> bool:
+        new = super().is_new()
+        self.seen = 0
+        return new
+
+
+class LoopOnce(model.Loop):
+    """Does not start its list again."""
+
+    def starts(self) -> bool:
+        return False
+
+
+class LazySwitch(model.Switch):
+    """Does not halt the old case."""
+
+    def tick_children(self) -> int:
+        child = self.children[self.case()]
+        status = child.tick()
+        if status != RUNNING:
+            child.reset()
+        return status
+
+
 class LenientCondition(model.Condition):
     """May be RUNNING."""
 
@@ -178,30 +240,41 @@ class LenientCondition(model.Condition):
 
 
 @pytest.mark.parametrize(
-    "wrong", [ForgetfulSequence, LazyReactiveSequence, ImpatientRetry, LateTimeout, TwiceHalted, LenientCondition]
-)
+    "wrong",
+    [
+        ForgetfulSequence, LazyReactiveSequence, ImpatientRetry, LateTimeout, TwiceHalted, LenientCondition,
+        LatePrecondition, UnheardHalt, LateWhile, EndlessNews, LoopOnce, LazySwitch,
+    ],
+)  # fmt: skip
 def test_a_wrong_model_is_found_out(runner: Path, wrong: type[Node]) -> None:
     kind = wrong.__mro__[1].__name__
     nodes = model.NODES | {kind: wrong}
-    report = compare_with_model(runner, generate(SEED, ENGINE, range(300)), lambda tree: run_model(tree, nodes))
-    assert report.failures
+    reports = (compare_with_model(runner, trees, lambda tree: run_model(tree, nodes)) for trees in _batches(ENGINE))
+    report = next((report for report in reports if report.failures), None)
+    assert report is not None, "it was not found out"
     tree, how = smallest_failure(
         report, lambda tree: engine_against_model(runner, tree, lambda tree: run_model(tree, nodes))
     )
     assert kind in tree.kinds()
-    assert sum(1 for _ in tree.root.walk()) <= 5, f"not shrunk well:\n{tree.text()}\n{how}"
+    assert sum(1 for _ in tree.root.walk()) <= 8, f"not shrunk well:\n{tree.text()}\n{how}"
     assert "engine: " in how or "faults: " in how
 
 
 @needs_btcpp
 @pytest.mark.parametrize(
-    "kind", ["SequenceWithMemory", "KeepRunningUntilFailure", "Repeat", "RetryUntilSuccessful", "IfThenElse", "RunOnce"]
-)
+    "kind",
+    [
+        "SequenceWithMemory", "KeepRunningUntilFailure", "Repeat", "RetryUntilSuccessful", "IfThenElse", "RunOnce",
+        "Precondition", "Loop", "Attributes",
+    ],
+)  # fmt: skip
 def test_without_its_rule_a_difference_is_found(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    trees = generate(SEED, Wanted(BTCPP_ALL.kinds, nonsense=False, odd_times=False), range(400))
-    trees = [tree for tree in trees if can_load(tree) and kind in tree.kinds()]
     plain = type(kind, (differences.BtCppNode, model.NODES[kind]), {})
     monkeypatch.setitem(differences.NODES, kind, plain)
-    theirs = run_btcpp(trees)
-    explained = [run_differing_model(tree) for tree in trees]
-    assert any(ours.outcomes != outcomes for ours, (outcomes, _) in zip(explained, theirs, strict=True))
+
+    def differs(batch: list[Tree]) -> bool:
+        trees = [tree for tree in batch if can_load(tree) and kind in tree.kinds()]
+        explained = [run_differing_model(tree) for tree in trees]
+        return any(ours.outcomes != theirs for ours, (theirs, _) in zip(explained, run_btcpp(trees), strict=True))
+
+    assert any(differs(batch) for batch in _batches(Wanted(BTCPP.kinds, nonsense=False, odd_times=False)))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -21,17 +22,55 @@ CALL_NAMES = ("start", "running", "halted")
 """Kinds of leaf calls: the one function of a Condition or SyncAction, or on_start; on_running; on_halted."""
 
 USER_LEAVES = ("Condition", "SyncAction", "StatefulAction")
-BUILT_IN_LEAVES = ("AlwaysSuccess", "AlwaysFailure", "Sleep")
+SCRIPT_LEAVES = ("Script", "ScriptCondition", "SetBlackboard")
+"""Leaves that the compiler makes SyncActions and Conditions of, which run a script."""
+BUILT_IN_LEAVES = ("AlwaysSuccess", "AlwaysFailure", "Sleep", *SCRIPT_LEAVES, "WasEntryUpdated")
 
 MANY = 0xFFFF
 
 
+ENTRIES = ("a", "b", "s")
+"""The entries that scripts read and write, numbers that begin with 0. In BehaviorTree.CPP a Switch declares its entry a
+text, and a Loop declares its own a number: `s` is for Switches, the others are for Loops."""
+SWITCHED = ENTRIES.index("s")
+
+OPERATIONS = ("<", "==", ":=", "+=", "value", "updates", "take")
+"""What a script does with its entry and its value: a comparison, an assignment; what Switch asks, WasEntryUpdated and
+its like, and Loop: the entry's value, how often it was written, the next item of the list 1 to `value`."""
+COMPARISONS = ("<", "==")
+ASSIGNMENTS = (":=", "+=")
+
+
+class Script(NamedTuple):
+    """One script."""
+
+    operation: str
+    entry: int
+    value: int = 0
+
+    def text(self) -> str:
+        """It as it stands in the XML."""
+        name = ENTRIES[self.entry]
+        if self.operation == "take":
+            return ";".join(str(item) for item in range(1, self.value + 1))
+        return f"{{{name}}}" if self.operation in ("value", "updates") else f"{name} {self.operation} {self.value}"
+
+
+ATTRIBUTES = ("_failureIf", "_successIf", "_skipIf", "_while", "_onSuccess", "_onFailure", "_post", "_onHalted")
+PRECONDITIONS = ATTRIBUTES[:4]
+
+
 class Shape(NamedTuple):
-    """What a kind of node needs: bounds of its number of children, and the XML attributes that are its parameters."""
+    """What a kind of node needs: bounds of its number of children, and the XML attributes that are its parameters.
+
+    `scripts`: those that are scripts; `statuses`: those that name a status.
+    """
 
     least: int
     most: int
     parameters: tuple[str, ...] = ()
+    scripts: tuple[str, ...] = ()
+    statuses: tuple[str, ...] = ()
 
 
 # From docs/semantics.md; whether the engine knows a kind is looked up in nodes.def (engine_kinds).
@@ -64,23 +103,38 @@ SHAPES: dict[str, Shape] = {
     "Delay": Shape(1, 1, ("delay_msec",)),
     "Timeout": Shape(1, 1, ("msec",)),
     "RunOnce": Shape(1, 1, ("then_skip",)),
+    "Script": Shape(0, 0, (), ("code",)),
+    "ScriptCondition": Shape(0, 0, (), ("code",)),
+    "SetBlackboard": Shape(0, 0, (), ("value",)),
+    "Precondition": Shape(1, 1, ("else",), ("if",), ("else",)),
+    "Attributes": Shape(1, 1, (), ATTRIBUTES),
+    "SkipUnlessUpdated": Shape(1, 1, (), ("entry",)),
+    "WaitValueUpdate": Shape(1, 1, (), ("entry",)),
+    "WasEntryUpdated": Shape(0, 0, (), ("entry",)),
+    "Loop": Shape(1, 1, ("if_empty",), ("queue",), ("if_empty",)),
+    "Switch": Shape(3, 7, (), ("variable",)),
 }
+SCRIPTED = frozenset(kind for kind, shape in SHAPES.items() if shape.scripts)
 
 
 @cache
 def engine_kinds() -> frozenset[str]:
     """The kinds of nodes that both this test and the engine know: SHAPES and nodes.def."""
-    return frozenset(SHAPES) & frozenset(node_types())
+    return frozenset(SHAPES) & frozenset((*node_types(), *SCRIPT_LEAVES))
 
 
 @dataclass
 class Spec:
-    """A node with what is below it. `answers`: what a leaf of the user's answers, one byte a tick."""
+    """A node with what is below it. `answers`: what a leaf of the user's answers, one byte a tick.
+
+    The pre- and postconditions of a node are a node above it, Attributes, as in the engine.
+    """
 
     kind: str
     children: list[Spec]
     parameters: tuple[int, ...] = ()
     answers: bytes = b""
+    scripts: tuple[Script | None, ...] = ()
 
     def walk(self) -> Iterator[Spec]:
         """This node and all below it, depth first."""
@@ -108,40 +162,63 @@ class Tree:
     def text(self) -> str:
         """The tree as BehaviorTree.CPP's XML, the answers of its leaves as comments, and the ticks."""
         lines = ['<root BTCPP_format="4">', '  <BehaviorTree ID="Differential">']
-        self._lines(self.root, 2, lines, iter(range(MANY)))
+        self._lines(self.root, 2, lines, itertools.count())
         lines += ["  </BehaviorTree>", "</root>", f"now [us]: {' '.join(map(str, self.times))}"]
         if self.halt_after is not None:
             lines.append(f"the whole tree is halted after {self.halt_after} ticks")
         return "\n".join(lines)
 
-    def _lines(self, spec: Spec, level: int, lines: list[str], numbers: Iterator[int]) -> None:
-        head = f"{'  ' * level}<{spec.kind} name={quoteattr(str(next(numbers)))}{attributes(spec)}"
+    def _lines(self, spec: Spec, level: int, lines: list[str], numbers: Iterator[int], above: str = "") -> None:
+        number = next(numbers)
+        if spec.kind == "Attributes":
+            self._lines(spec.children[0], level, lines, numbers, attributes(spec))
+            return
+        head = f'{"  " * level}<{tag(spec)} name="{number}"{attributes(spec)}{above}'
         if spec.children:
             lines.append(head + ">")
             for child in spec.children:
                 self._lines(child, level + 1, lines, numbers)
-            lines.append(f"{'  ' * level}</{spec.kind}>")
+            lines.append(f"{'  ' * level}</{tag(spec)}>")
         else:
             answers = "".join("IRSFK"[answer] if answer < 5 else "?" for answer in spec.answers)
             lines.append(head + "/>" + (f" <!-- answers {answers} -->" if answers else ""))
 
 
+def tag(spec: Spec) -> str:
+    """Its name in the XML."""
+    if spec.kind == "Switch":
+        return f"Switch{len(spec.children) - 1}"
+    return "LoopInt" if spec.kind == "Loop" else spec.kind
+
+
 def attributes(spec: Spec) -> str:
-    """The parameters as XML attributes, each with a space before it."""
-    return "".join(
-        f' {name}="{value}"' for name, value in zip(SHAPES[spec.kind].parameters, spec.parameters, strict=True)
-    )
+    """The parameters and scripts as XML attributes, each with a space before it."""
+    shape = SHAPES[spec.kind]
+    values: dict[str, str] = {}
+    for name, value in zip(shape.parameters, spec.parameters, strict=True):
+        values[name] = STATUS_NAMES[value] if name in shape.statuses else str(value)
+    for name, script in zip(shape.scripts, spec.scripts, strict=True):
+        if script is not None:
+            values[name] = script.text()
+            if spec.kind == "Loop":
+                values["value"] = f"{{{ENTRIES[script.entry]}}}"
+            if spec.kind == "SetBlackboard":
+                values |= {"value": str(script.value), "output_key": ENTRIES[script.entry]}
+    if spec.kind == "Switch":
+        values |= {f"case_{place + 1}": str(place) for place in range(len(spec.children) - 1)}
+    return "".join(f" {name}={quoteattr(value)}" for name, value in values.items())
 
 
 class Outcome(NamedTuple):
     """What one tick showed; `status` is None for a halt of the whole tree.
 
-    `calls`: (number of the leaf's node, kind of call) in order; `codes`: a status code a node.
+    `calls`: (number of the leaf's node, kind of call) in order; `codes`: a status code a node; `entries`: their values.
     """
 
     status: int | None
     calls: list[tuple[int, int]]
     codes: bytes
+    entries: tuple[int, ...]
 
 
 class Result(NamedTuple):

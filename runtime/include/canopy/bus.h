@@ -92,13 +92,13 @@ typedef struct {
     canopy_bus_counters_t counters;
 } canopy_bus_state_t;
 
-/** The sum, or the largest value where that is less. */
+/** The sum, or the largest value where that is less. O(1); may be called from anywhere. */
 static inline uint32_t canopy_sum(uint32_t a, uint32_t b)
 {
     return a <= UINT32_MAX - b ? a + b : UINT32_MAX;
 }
 
-/** Adds one, and stays at the largest value instead of starting again at 0. */
+/** Adds one, and stays at the largest value instead of starting again at 0. O(1). */
 static inline void canopy_count(uint32_t *counter)
 {
     *counter += *counter != UINT32_MAX ? 1u : 0u;
@@ -119,7 +119,7 @@ void canopy_bus_begin_tick(canopy_bus_state_t *self, canopy_time_t now);
  */
 void canopy_bus_commit(canopy_bus_state_t *self, const canopy_can_t *can, uint32_t tick);
 
-/** Frames refused for any reason but an unknown id. */
+/** Frames refused for any reason but an unknown id; saturates. O(1). */
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters);
 
 #endif

@@ -5,6 +5,8 @@
  *
  * Threads: the functions of one driver are called from the loop's thread only. A driver that receives in an interrupt
  * or a thread of its own hands frames over through a canopy_ring_t.
+ *
+ * receive and send are O(bytes) and do not allocate; what else a driver costs, its header says.
  */
 #ifndef CANOPY_CAN_H
 #define CANOPY_CAN_H
@@ -63,7 +65,7 @@ typedef struct {
      * @return 1 a frame is waiting, 0 time is over, negative canopy_error_t.
      */
     int (*wait)(void *context, uint32_t timeout_us);
-    /** Copies the counters. */
+    /** Copies the counters. O(1). */
     void (*stats)(void *context, canopy_can_stats_t *stats);
 } canopy_can_t;
 

@@ -12,7 +12,7 @@
 /** A point in time or a duration [µs]. */
 typedef uint64_t canopy_time_t;
 
-/** A clock driver: functions and the object they work on. */
+/** A clock driver: functions and the object they work on. Both are called from the loop's thread only. */
 typedef struct {
     /** The driver's object; handed to every function. */
     void *context;
@@ -25,7 +25,10 @@ typedef struct {
     bool (*wait_until)(void *context, canopy_time_t deadline);
 } canopy_clock_t;
 
-/** True when the time `now` is at or after `deadline`; right across the wrap-around of the 64-bit count. */
+/**
+ * True when the time `now` is at or after `deadline`; right across the wrap-around of the 64-bit count, as long as the
+ * two are less than 2^63 us apart. O(1); may be called from anywhere.
+ */
 static inline bool canopy_time_reached(canopy_time_t now, canopy_time_t deadline)
 {
     return (now - deadline) < (UINT64_C(1) << 63);

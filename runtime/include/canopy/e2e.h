@@ -7,6 +7,9 @@
  * first, and bytes 1..length-1. The low half of byte 1 is a counter 0..14. The data id is not sent: a frame that carries the right
  * bytes under the wrong arbitration id does not pass.
  *
+ * Threads: the functions have no state of their own, never block, and may be called from anywhere; a receiver's memory
+ * belongs to one thread.
+ *
  * Source: AUTOSAR PRS_E2EProtocol, Profile 11. The tests compare with the PyPI package `autosar-e2e`.
  */
 #ifndef CANOPY_E2E_H
@@ -35,13 +38,21 @@ typedef struct {
     bool started;
 } canopy_e2e_receiver_t;
 
-/** CRC of a protected message. data: length bytes, 2..64. O(length), about 75 instructions a byte on Cortex-M4. */
+/**
+ * The CRC that belongs into byte 0 of a protected message.
+ * @param data   `length` bytes; byte 0 is not looked at
+ * @param length 2..64; not checked
+ *
+ * O(length), about 75 instructions a byte on Cortex-M4.
+ */
 uint8_t canopy_e2e_crc(uint16_t data_id, const uint8_t *data, uint8_t length);
 
-/** Writes counter (0..14) and CRC into a message of 2..64 bytes. The high half of byte 1 is kept. */
+/**
+ * Writes counter (0..14, not checked) and CRC into a message of 2..64 bytes. The high half of byte 1 is kept. O(length).
+ */
 void canopy_e2e_protect(uint16_t data_id, uint8_t counter, uint8_t *data, uint8_t length);
 
-/** Checks a message of 2..64 bytes and moves the receiver's memory on. */
+/** Checks a message of 2..64 bytes (not checked) and moves the receiver's memory on, unless the CRC is wrong. O(length). */
 canopy_e2e_result_t canopy_e2e_check(canopy_e2e_receiver_t *receiver, uint16_t data_id, const uint8_t *data,
                                      uint8_t length);
 

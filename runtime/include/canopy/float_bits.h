@@ -4,6 +4,8 @@
  * IEEE 754 numbers as bits, for the generated codecs of buses with float signals. Nothing here computes with floats, so no
  * floating-point unit and no helper of the compiler's library is needed: values are only copied and compared as integers.
  *
+ * All functions are O(1), have no state, and may be called from anywhere.
+ *
  * How bits are compared: IEEE numbers are sign and magnitude, and for positive ones a larger number has larger bits. With
  * the magnitude's bits inverted where the sign is set, the bits as a two's complement integer are in the order of the
  * numbers:

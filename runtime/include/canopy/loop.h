@@ -94,6 +94,8 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
  * One scan cycle, without waiting and without accounting for time: for programs that keep their own time.
  * @param now this cycle's time [us]
  * @return status of the root
+ *
+ * O(nodes + messages + frames waiting, rx_max at most), and what the leaves take. Does not block.
  */
 canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now);
 
@@ -123,7 +125,7 @@ void canopy_loop_run_all(canopy_loop_t *const *loops, uint16_t count);
 
 /**
  * Halts the tree and sends the outputs that result: safe values, unless a halt handler wrote others.
- * canopy_loop_run() does it at its end.
+ * canopy_loop_run() does it at its end. O(nodes + messages).
  */
 void canopy_loop_stop(canopy_loop_t *self, canopy_time_t now);
 

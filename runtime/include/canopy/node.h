@@ -50,10 +50,10 @@ static inline bool canopy_goes_on(const canopy_tree_instance_t *self, uint16_t n
     return self->status[node] == (uint8_t)CANOPY_RUNNING || self->status[node] == (uint8_t)CANOPY_SKIPPED;
 }
 
-/** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. */
+/** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. O(nodes in it). */
 void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top);
 
-/** The parent resets a child: halted if RUNNING, then IDLE. */
+/** The parent resets a child: halted if RUNNING, then IDLE. O(1), or O(nodes below) when it is RUNNING. */
 static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t child)
 {
     if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
@@ -71,7 +71,11 @@ static inline canopy_step_t canopy_pass_on(canopy_tree_instance_t *self, uint16_
     return canopy_done(status);
 }
 
-/** Resets the children from `first` to the last one of `node`. @return true when every one of them was SKIPPED. */
+/**
+ * Resets the children from `first` (a child, or the node's end) to the last one of `node`. O(children), and O(nodes below)
+ * for those that are RUNNING.
+ * @return true when every one of them was SKIPPED
+ */
 static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t node, uint16_t first)
 {
     const canopy_node_t *nodes = self->tree->nodes;
@@ -89,7 +93,10 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
     return all_skipped;
 }
 
-/** A parameter of a built-in node, from the XML or from an entry; `which` counts in the order of nodes.def. */
+/**
+ * A parameter of a built-in node, from the XML or from an entry, in the unit of its attribute; `which` counts in the order
+ * of nodes.def. O(1), or as long as the script takes that gives it.
+ */
 static inline int32_t canopy_parameter(const canopy_tree_instance_t *self, uint16_t node, unsigned which)
 {
     int32_t value = self->tree->parameters[self->tree->nodes[node].parameter + which];
@@ -105,7 +112,7 @@ static inline int32_t canopy_run_script(canopy_tree_instance_t *self, uint16_t n
     return script >= 0 ? self->tree->scripts[script](self->application) : 0;
 }
 
-/** The node's state words. */
+/** The node's state words, as many as nodes.def says; O(1). */
 static inline uint16_t *canopy_words(canopy_tree_instance_t *self, uint16_t node)
 {
     return &self->words[self->tree->nodes[node].state];

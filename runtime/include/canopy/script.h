@@ -11,6 +11,7 @@
 
 #include <stdint.h>
 
+/** Counts one result that was limited. */
 static inline void canopy_script_fault(uint32_t *faults)
 {
     if (*faults != UINT32_MAX) {

@@ -2,6 +2,7 @@
 /**
  * @file
  * Helpers of the generated codecs and images: raw values, sign extension, and who may write an output.
+ * All are O(1) and have no state of their own; the bits that canopy_output_claim() works on belong to the loop's thread.
  */
 #ifndef CANOPY_SIGNAL_H
 #define CANOPY_SIGNAL_H
@@ -38,7 +39,9 @@ static inline int64_t canopy_sign_extend64(uint64_t raw, unsigned bits)
  * what a halt handler writes in the same tick, whichever came first.
  *
  * @param written one bit a signal: it has been written by a ticked action in this tick
+ * @param signal  0..32 * the number of words - 1; not checked
  * @param halting the write comes from a halt handler
+ * @return true: write it. A ticked action's write may always stand.
  */
 static inline bool canopy_output_claim(uint32_t *written, unsigned signal, bool halting)
 {

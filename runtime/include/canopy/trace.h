@@ -10,6 +10,8 @@
  * the loss counters at a slow rate.
  *
  * Frames count up a sequence number, so that a receiver knows when it has lost one.
+ *
+ * Threads: the loop's thread only. Nothing blocks: a frame that the driver does not take is dropped and counted.
  */
 #ifndef CANOPY_TRACE_H
 #define CANOPY_TRACE_H
@@ -52,7 +54,14 @@ typedef struct {
     uint32_t overruns;
 } canopy_trace_tick_t;
 
-/** Sends the trace of a tick. O(nodes), at most changes_max + 3 frames. */
+/**
+ * Sends the trace of a tick, after canopy_tree_tick(); canopy_loop_cycle() does it. O(nodes), at most changes_max + 3 frames.
+ *
+ * @param self     moves on: what has been sent
+ * @param tree     ticked
+ * @param tick     its numbers
+ * @param counters of the bus, for CanopyHealth
+ */
 void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                        const canopy_tree_instance_t *tree, const canopy_can_t *can, const canopy_trace_tick_t *tick,
                        const canopy_bus_counters_t *counters);

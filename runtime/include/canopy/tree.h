@@ -140,8 +140,8 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
  * @param now  time of this tick [us]; any value, but going back makes Timeout wait longer
  * @return RUNNING, SUCCESS, FAILURE or SKIPPED. A tree that completed starts again with the next tick.
  *
- * Visits each node at most once, halts included twice. Calls leaf functions; these must not call back into this
- * instance.
+ * Visits each node at most once, halts included twice, so O(nodes); the stack does not depend on the tree. Calls leaf
+ * functions; these must not call back into this instance.
  */
 canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now);
 
@@ -157,7 +157,7 @@ void canopy_tree_halt(canopy_tree_instance_t *self);
  */
 void canopy_tree_reset(canopy_tree_instance_t *self);
 
-/** Status of a node now: IDLE for one that its parent has reset. node must be < node_count. */
+/** Status of a node now: IDLE for one that its parent has reset. node must be < node_count (not checked). O(1). */
 static inline canopy_status_t canopy_tree_status(const canopy_tree_instance_t *self, uint16_t node)
 {
     uint8_t code = self->status[node];
@@ -165,7 +165,10 @@ static inline canopy_status_t canopy_tree_status(const canopy_tree_instance_t *s
     return (code & CANOPY_STATUS_WAS) != 0u ? CANOPY_IDLE : (canopy_status_t)code;
 }
 
-/** Status code of a node: its canopy_status_t, or CANOPY_STATUS_WAS + what it was before its parent reset it. */
+/**
+ * Status code of a node: its canopy_status_t, or CANOPY_STATUS_WAS + what it was before its parent reset it. node must be
+ * < node_count (not checked). O(1).
+ */
 static inline uint8_t canopy_tree_status_code(const canopy_tree_instance_t *self, uint16_t node)
 {
     return self->status[node];

@@ -45,8 +45,16 @@ static inline canopy_step_t canopy_parallel_enter(canopy_tree_instance_t *self, 
     return canopy_parallel_open_child(self, node, (uint16_t)(node + 1u));
 }
 
+/** The node is done. A function of its own, called last: the frame of its caller is gone while children are halted. */
+static CANOPY_SELDOM canopy_step_t canopy_parallel_complete(canopy_tree_instance_t *self, uint16_t node,
+                                                            canopy_status_t status)
+{
+    (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
+    return canopy_done(status);
+}
+
 /** RUNNING while neither threshold is met. */
-static inline canopy_status_t canopy_parallel_verdict(canopy_tree_instance_t *self, uint16_t node)
+static CANOPY_SELDOM canopy_status_t canopy_parallel_verdict(canopy_tree_instance_t *self, uint16_t node)
 {
     const uint16_t *words = canopy_words(self, node);
     int32_t children = words[CANOPY_PARALLEL_CHILDREN];
@@ -88,8 +96,7 @@ static CANOPY_SELDOM canopy_step_t canopy_parallel_child(canopy_tree_instance_t 
     if (verdict == CANOPY_RUNNING) {
         verdict = CANOPY_SKIPPED;
     }
-    (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
-    return canopy_done(verdict);
+    return canopy_parallel_complete(self, node, verdict);
 }
 
 #endif

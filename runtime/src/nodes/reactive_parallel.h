@@ -9,7 +9,7 @@
 #ifndef CANOPY_NODES_REACTIVE_PARALLEL_H
 #define CANOPY_NODES_REACTIVE_PARALLEL_H
 
-#include "canopy/node.h"
+#include "parallel.h"
 
 static inline canopy_step_t canopy_reactive_parallel_enter(uint16_t node)
 {
@@ -50,10 +50,7 @@ static CANOPY_SELDOM canopy_step_t canopy_reactive_parallel_child(canopy_tree_in
         return nodes[child].end;
     }
     verdict = canopy_reactive_parallel_verdict(self, node);
-    if (verdict != CANOPY_RUNNING) {
-        (void)canopy_reset_children(self, node, (uint16_t)(node + 1u));
-    }
-    return canopy_done(verdict);
+    return verdict == CANOPY_RUNNING ? canopy_done(CANOPY_RUNNING) : canopy_parallel_complete(self, node, verdict);
 }
 
 #endif

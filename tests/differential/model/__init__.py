@@ -50,6 +50,19 @@ from differential.model.leaves import (
     UserLeaf,
 )
 from differential.model.node import COMPLETED, Node, World
+from differential.model.scripts import (
+    Attributes,
+    EntryUpdated,
+    Loop,
+    Precondition,
+    Script,
+    ScriptCondition,
+    SetBlackboard,
+    SkipUnlessUpdated,
+    Switch,
+    WaitValueUpdate,
+    WasEntryUpdated,
+)
 from differential.tree import Outcome, Result, Spec, Tree
 
 __all__ = [
@@ -59,10 +72,12 @@ __all__ = [
     "AlwaysSuccess",
     "AsyncFallback",
     "AsyncSequence",
+    "Attributes",
     "Condition",
     "Counting",
     "Decorator",
     "Delay",
+    "EntryUpdated",
     "Fallback",
     "ForceFailure",
     "ForceSuccess",
@@ -70,10 +85,12 @@ __all__ = [
     "InOrder",
     "Inverter",
     "KeepRunningUntilFailure",
+    "Loop",
     "ModelTree",
     "Node",
     "Parallel",
     "ParallelAll",
+    "Precondition",
     "Reactive",
     "ReactiveFallback",
     "ReactiveParallel",
@@ -82,14 +99,21 @@ __all__ = [
     "Repeat",
     "RetryUntilSuccessful",
     "RunOnce",
+    "Script",
+    "ScriptCondition",
     "Sequence",
     "SequenceWithMemory",
+    "SetBlackboard",
+    "SkipUnlessUpdated",
     "Sleep",
     "StatefulAction",
+    "Switch",
     "SyncAction",
     "Timeout",
     "TryCatch",
     "UserLeaf",
+    "WaitValueUpdate",
+    "WasEntryUpdated",
     "WhileDoElse",
     "World",
     "run_model",
@@ -103,6 +127,8 @@ NODES: dict[str, type[Node]] = {
         Parallel, ParallelAll, ReactiveParallel, IfThenElse, WhileDoElse, TryCatch,
         Inverter, ForceSuccess, ForceFailure, Repeat, RetryUntilSuccessful, KeepRunningUntilFailure,
         Delay, Timeout, RunOnce,
+        Script, ScriptCondition, SetBlackboard, Precondition, Attributes, SkipUnlessUpdated, WaitValueUpdate,
+        WasEntryUpdated, Loop, Switch,
     )
 }  # fmt: skip
 
@@ -128,7 +154,7 @@ class ModelTree:
 
     def _outcome(self, status: int | None) -> Outcome:
         calls, self.world.calls = self.world.calls, []
-        return Outcome(status, calls, bytes([node.code for node in self.nodes]))
+        return Outcome(status, calls, bytes([node.code for node in self.nodes]), tuple(self.world.entries))
 
     def tick(self, number: int) -> Outcome:
         """Tick `number`, from 0. A tree that completed starts again with the next tick."""

@@ -12,6 +12,9 @@ from differential.tree import FAILURE, RUNNING, SKIPPED, SUCCESS
 class Decorator(Node):
     """What decorators share: a child that is done, completed or SKIPPED, is reset."""
 
+    def child_runs(self) -> bool:
+        return self.children[0].code == RUNNING
+
     def tick_child(self) -> int:
         status = self.children[0].tick()
         if status != RUNNING:

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from differential.tree import FAILURE, IDLE, RUNNING, SUCCESS, WAS, Spec
+from differential.tree import COMPARISONS, ENTRIES, FAILURE, IDLE, RUNNING, SUCCESS, WAS, Script, Spec
 
 COMPLETED = (SUCCESS, FAILURE)
 TIME_MASK = (1 << 64) - 1
 
 
 class World:
-    """What the nodes of one running tree share: the time, the leaves' answers, and the log of their calls."""
+    """What the nodes of one running tree share: the time, the log of the leaves' calls, and the entries of scripts."""
 
     def __init__(self) -> None:
         self.now = 0
@@ -18,6 +18,22 @@ class World:
         self.calls: list[tuple[int, int]] = []
         self.faults = 0
         self.fault_node = 0xFFFF  # none yet
+        self.entries = [0] * len(ENTRIES)
+        self.updates = [0] * len(ENTRIES)
+
+    def write(self, entry: int, value: int) -> None:
+        self.entries[entry] = value
+        self.updates[entry] += 1
+
+    def run(self, script: Script | None) -> bool:
+        """Runs an assignment or asks a comparison; without a script, nothing is true."""
+        if script is None:
+            return False
+        value = self.entries[script.entry]
+        if script.operation in COMPARISONS:
+            return value < script.value if script.operation == "<" else value == script.value
+        self.write(script.entry, script.value + (value if script.operation == "+=" else 0))
+        return True
 
 
 def reached(now: int, deadline: int) -> bool:

@@ -2,6 +2,7 @@
 /**
  * @file
  * Which frames a CAN driver hands to the loop, and which it takes from it: the same words for every driver.
+ * The functions have no state, never block, and may be called from anywhere.
  */
 #ifndef CANOPY_CAN_ACCEPTANCE_H
 #define CANOPY_CAN_ACCEPTANCE_H

@@ -46,7 +46,7 @@ typedef struct {
 canopy_error_t canopy_can_open(canopy_can_port_t *port, const char *spec, const canopy_can_acceptance_t *acceptance,
                                char *message, size_t message_size);
 
-/** Closes; nothing happens when it is closed already. */
+/** Closes; nothing happens when it is closed already. Afterwards `can` is NULL: nothing may use the driver any more. */
 void canopy_can_close(canopy_can_port_t *port);
 
 #endif

@@ -68,7 +68,7 @@ typedef struct {
  * @param inner    an open driver that can wait; lives longer than the pair. Its filter lets the step message through.
  * @param step_id  11-bit id of the step message
  * @param stop     ends a wait within CANOPY_LOCKSTEP_SLICE_US when it becomes true; NULL: never
- * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT: a NULL or an id over 0x7FF; CANOPY_ERROR_UNSUPPORTED: inner cannot wait.
+ * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT: a NULL or an id over 0x7FF; CANOPY_ERROR_UNSUPPORTED: inner cannot wait. O(1).
  */
 canopy_error_t canopy_lockstep_init(canopy_lockstep_t *self, const canopy_can_t *inner, uint32_t step_id,
                                     const atomic_bool *stop);
