@@ -399,6 +399,7 @@ static canopy_image_error_t decode_node(image_t *image, uint16_t index)
 /** Nodes, parameters, texts: into the slot's buffers. */
 static canopy_image_error_t decode(image_t *image)
 {
+    image->where = 0;
     /* An unended text would be read on into what lies behind it. */
     if (image->text_size != 0u && image->texts[image->text_size - 1u] != 0u) {
         return CANOPY_IMAGE_SIZE;
@@ -417,6 +418,7 @@ static canopy_image_error_t decode(image_t *image)
             return error;
         }
     }
+    image->where = 0;
     return image->next_use == image->use_count && image->next_value == image->value_count ? CANOPY_IMAGE_OK
                                                                                           : CANOPY_IMAGE_SIZE;
 }

@@ -10,14 +10,26 @@ from typing import Any
 
 import click
 
-from canopy.compiler.emit import Application, load_application, model, write_files
+from canopy.compiler.emit import MODEL_FORMAT, Application, load_application, model, write_files
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
 from canopy.compiler.node_types import node_types
 from canopy.compiler.port_types import Options
-from canopy.model import ModelError, load_model
 
 INPUT_ERROR = 2
+BITRATE = 500_000  # of no account for an image
+# What is read of a model file.
+FIELDS: dict[str, type] = {
+    "application": str,
+    "period_us": int,
+    "bus.dbc": str,
+    "bus.node": str,
+    "image.engine": str,
+    **{f"image.{what}": int for what in ("nodes", "uses", "parameters", "words", "texts")},
+    **{f"image.{what}": list for what in ("kinds", "scripts", "entries")},
+    "image.types.floating_point": bool,
+    "image.types.map": dict,
+}
 
 
 def _fail(text: str) -> None:
@@ -25,30 +37,43 @@ def _fail(text: str) -> None:
     sys.exit(INPUT_ERROR)
 
 
-def _firmware_part(path: Path) -> dict[str, Any]:
-    """The part "image" of a model file that load_model() has accepted."""
-    data = json.loads(path.read_text(encoding="utf-8"))
-    part = data.get("image")
-    if not isinstance(part, dict):
+def _read_model(path: Path) -> dict[str, Any]:
+    """The firmware's model file. (canopy.model reads it for tools that watch, which need a trace.)"""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CompileError(Place(str(path)), f"cannot be read: {error.strerror}", "the build writes it") from error
+    except (ValueError, RecursionError) as error:
+        raise CompileError(Place(str(path)), f"is no JSON: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != MODEL_FORMAT:
+        raise CompileError(Place(str(path)), "is no model file of this version", "build the firmware again")
+    if "image" not in data:
         raise CompileError(
             Place(str(path)), "this firmware takes no images", "build it with IMAGE_NODES, or --image-nodes"
         )
-    return part
+    return data
+
+
+def _field(data: dict[str, Any], path: str, kind: type, file: Path) -> Any:
+    """A value of the model file, `image.types.map` for example."""
+    value: Any = data
+    for name in path.split("."):
+        value = value.get(name) if isinstance(value, dict) else None
+    if not isinstance(value, kind):
+        raise CompileError(Place(str(file)), f"{path} is not of type {kind.__name__}", "build the firmware again")
+    return value
 
 
 def _compile(tree: Path, firmware: Path) -> tuple[Application, bytes]:
-    part = _firmware_part(firmware)
-    there = load_model(firmware)
-    try:
-        types = part["types"]
-        options = Options(bool(types["floating_point"]), dict(types["map"]), types["include"])
-        period_ms = there.period_us // 1000
-        application = load_application(
-            there.application, tree, there.dbc, there.bus_node, period_ms, 500_000, options.include, options
-        )
-        return application, make_image(application.table, part, there.application)
-    except (KeyError, TypeError) as error:
-        raise CompileError(Place(str(firmware)), f"image: {error} is missing or wrong", "build the firmware") from error
+    data = _read_model(firmware)
+    for path, kind in FIELDS.items():
+        _field(data, path, kind, firmware)
+    bus, types = data["bus"], data["image"]["types"]
+    options = Options(types["floating_point"], types["map"], types.get("include"))
+    name, period_ms = data["application"], data["period_us"] // 1000
+    dbc = firmware.parent / bus["dbc"]
+    application = load_application(name, tree, dbc, bus["node"], period_ms, BITRATE, options.include, options)
+    return application, make_image(application.table, data["image"], name)
 
 
 @click.group()
@@ -87,7 +112,7 @@ def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: P
         if depfile is not None:
             read = [str(file.resolve()) for file in (*application.table.tree.files, firmware, application.bus.path)]
             depfile.write_text(f"{output}: {' '.join(read)}\n".replace("\\", "/"))
-    except (CompileError, ModelError) as error:
+    except CompileError as error:
         _fail(str(error))
     except OSError as error:
         _fail(f"{output}: error: cannot be written: {error.strerror}")
