@@ -359,9 +359,8 @@ static void what_runs_goes_on_while_another_is_refused_or_loaded(void)
         put(use_at(6), 1, 8); /* refused late: at its last leaf */
         seal();
         TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_PORTS, load_copy(&where));
-        TEST_ASSERT_EQUAL_INT(
-            CANOPY_IMAGE_OK,
-            canopy_image_load(&exchange_image, exchange_other_bytes, sizeof exchange_other_bytes, NULL));
+        TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK, canopy_image_load(&exchange_image, exchange_other_bytes,
+                                                                 sizeof exchange_other_bytes, NULL));
     }
 }
 
@@ -369,8 +368,8 @@ static void an_image_may_lie_at_any_address(void)
 {
     for (unsigned offset = 0; offset < 8u; offset++) {
         memcpy(copy + offset, exchange_other_bytes, sizeof exchange_other_bytes);
-        TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK, canopy_image_load(&exchange_image, copy + offset,
-                                                                 sizeof exchange_other_bytes, NULL));
+        TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK,
+                              canopy_image_load(&exchange_image, copy + offset, sizeof exchange_other_bytes, NULL));
     }
 }
 
@@ -406,10 +405,10 @@ static void every_flipped_bit_is_refused(void)
 
         copy[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
         error = canopy_image_load(&exchange_image, copy, copy_size, NULL);
-        TEST_ASSERT_EQUAL_INT(bit < 32u                        ? CANOPY_IMAGE_MAGIC
-                              : bit < 48u                      ? CANOPY_IMAGE_FORMAT
+        TEST_ASSERT_EQUAL_INT(bit < 32u                           ? CANOPY_IMAGE_MAGIC
+                              : bit < 48u                         ? CANOPY_IMAGE_FORMAT
                               : bit / 32u == (size_t)AT_SIZE / 4u ? CANOPY_IMAGE_SIZE
-                                                               : CANOPY_IMAGE_CRC,
+                                                                  : CANOPY_IMAGE_CRC,
                               error);
         copy[bit / 8u] ^= (uint8_t)(1u << (bit % 8u));
     }
@@ -611,8 +610,7 @@ static void more_uses_of_a_kind_than_there_is_room_for_are_refused(void)
 
     take(exchange_main_bytes, sizeof exchange_main_bytes);
     /* Idle has no ports, so a use of it is 8 bytes: five of them, at the end, in a tree of their own. */
-    for (node = 0; copy[node_at(node)] != CANOPY_NODE_CONDITION || get(node_at(node) + 8u, 2) != 3u; node++) {
-    }
+    for (node = 0; copy[node_at(node)] != CANOPY_NODE_CONDITION || get(node_at(node) + 8u, 2) != 3u; node++) {}
     memcpy(copy + node_at(1), copy + node_at(node), 12);
     put(node_at(0), CANOPY_NODE_REACTIVE_FALLBACK, 1);
     put(node_at(0) + 4u, 6, 2);

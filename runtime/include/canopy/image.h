@@ -33,19 +33,20 @@
 /** Why an image is refused. Stable: the numbers may be logged and sent. `where` is what canopy_image_load() gives. */
 typedef enum {
     CANOPY_IMAGE_OK = 0,
-    CANOPY_IMAGE_ARGUMENT = -1,  /**< A pointer is NULL. */
-    CANOPY_IMAGE_SIZE = -2,      /**< More or fewer bytes than the image says, or than its parts need. */
-    CANOPY_IMAGE_MAGIC = -3,     /**< Not an image. */
-    CANOPY_IMAGE_FORMAT = -4,    /**< Another version of the format. */
-    CANOPY_IMAGE_CRC = -5,       /**< Damaged. */
-    CANOPY_IMAGE_ENGINE = -6,    /**< Made for a runtime with other node types. */
-    CANOPY_IMAGE_TOO_LARGE = -7, /**< where: 0 nodes, 1 parameters, 2 state words, 3 texts: more than there is room for. */
-    CANOPY_IMAGE_KIND = -8,      /**< where: place in the image's kinds; the firmware has no such leaf or control node. */
-    CANOPY_IMAGE_SCRIPT = -9,    /**< where: place in the image's scripts; the firmware has no such script. */
-    CANOPY_IMAGE_ENTRY = -10,    /**< where: place in the image's entries; the firmware has no such entry. */
-    CANOPY_IMAGE_USES = -11,     /**< where: node; more uses of its kind than the firmware has room for. */
-    CANOPY_IMAGE_PORTS = -12,    /**< where: node; its ports are connected as in no use of the firmware, or wrongly. */
-    CANOPY_IMAGE_TREE = -13      /**< where: node; canopy_tree_validate() refuses it, or what it names is not there. */
+    CANOPY_IMAGE_ARGUMENT = -1, /**< A pointer is NULL. */
+    CANOPY_IMAGE_SIZE = -2,     /**< More or fewer bytes than the image says, or than its parts need. */
+    CANOPY_IMAGE_MAGIC = -3,    /**< Not an image. */
+    CANOPY_IMAGE_FORMAT = -4,   /**< Another version of the format. */
+    CANOPY_IMAGE_CRC = -5,      /**< Damaged. */
+    CANOPY_IMAGE_ENGINE = -6,   /**< Made for a runtime with other node types. */
+    CANOPY_IMAGE_TOO_LARGE =
+        -7,                   /**< where: 0 nodes, 1 parameters, 2 state words, 3 texts: more than there is room for. */
+    CANOPY_IMAGE_KIND = -8,   /**< where: place in the image's kinds; the firmware has no such leaf or control node. */
+    CANOPY_IMAGE_SCRIPT = -9, /**< where: place in the image's scripts; the firmware has no such script. */
+    CANOPY_IMAGE_ENTRY = -10, /**< where: place in the image's entries; the firmware has no such entry. */
+    CANOPY_IMAGE_USES = -11,  /**< where: node; more uses of its kind than the firmware has room for. */
+    CANOPY_IMAGE_PORTS = -12, /**< where: node; its ports are connected as in no use of the firmware, or wrongly. */
+    CANOPY_IMAGE_TREE = -13   /**< where: node; canopy_tree_validate() refuses it, or what it names is not there. */
 } canopy_image_error_t;
 
 /** What a port is. Numbers within one firmware, not in images. */
@@ -79,12 +80,12 @@ typedef struct {
 typedef struct {
     uint64_t hash; /**< Of its signature. */
     const canopy_image_port_t *ports;
-    const void *base_ports;      /**< The ports structs of the uses in the firmware's own tree. */
-    const uint64_t *base_hashes; /**< Of what an image cannot give itself in those uses; 0: nothing. */
-    void *pool[CANOPY_IMAGE_SLOTS];             /**< uses_max ports structs for images. */
-    uint16_t *sources[CANOPY_IMAGE_SLOTS];      /**< For canopy_image_connect(): uses_max * port_count. */
-    uint16_t *bases[CANOPY_IMAGE_SLOTS];        /**< uses_max: the use in the firmware's tree, or CANOPY_IMAGE_NONE. */
-    uint16_t ports_size; /**< [bytes] */
+    const void *base_ports;                /**< The ports structs of the uses in the firmware's own tree. */
+    const uint64_t *base_hashes;           /**< Of what an image cannot give itself in those uses; 0: nothing. */
+    void *pool[CANOPY_IMAGE_SLOTS];        /**< uses_max ports structs for images. */
+    uint16_t *sources[CANOPY_IMAGE_SLOTS]; /**< For canopy_image_connect(): uses_max * port_count. */
+    uint16_t *bases[CANOPY_IMAGE_SLOTS];   /**< uses_max: the use in the firmware's tree, or CANOPY_IMAGE_NONE. */
+    uint16_t ports_size;                   /**< [bytes] */
     uint16_t port_count;
     uint16_t base_count;
     uint16_t index; /**< In canopy_tree_t.leaves or .controls. */
