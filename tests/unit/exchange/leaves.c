@@ -91,14 +91,14 @@ void drive_on_halted(const exchange_input_t *in, exchange_output_t *out, const d
     exchange_set_fan_speed(out, ports->speed);
 }
 
-/* Ticks the child at `place` only. */
+/* Ticks the child at `place` only. An image may give it any place, and any number of children. */
 canopy_step_t first_enter(canopy_tree_instance_t *tree, uint16_t node, const exchange_input_t *in,
                           const first_ports_t *ports)
 {
     uint16_t child = (uint16_t)(node + 1u);
 
     (void)in;
-    for (uint8_t place = ports->place; place > 0u; place--) {
+    for (uint16_t place = ports->place % canopy_count_children(tree, node); place > 0u; place--) {
         child = tree->tree->nodes[child].end;
     }
     return child;
