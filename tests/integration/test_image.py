@@ -204,7 +204,9 @@ def test_a_signal_that_no_use_reads_changes_what_the_leaf_waits_for(tmp_path: Pa
 
 def test_texts_in_scripts_are_told_apart(tmp_path: Path, firmware: Path) -> None:
     """`label := 1u` is another text in a tree with other texts, though the C is the same."""
-    nodes = "<Sequence><Script code=\"label := 'meassured'; note := 0\"/>" + MEASURE + '<Note value="{note}"/></Sequence>'
+    nodes = (
+        "<Sequence><Script code=\"label := 'meassured'; note := 0\"/>" + MEASURE + '<Note value="{note}"/></Sequence>'
+    )
     expect_refused(tmp_path, build(tmp_path, firmware, nodes), "x.xml:4:25", "has no such script")
 
 

@@ -124,7 +124,9 @@ def flash_bytes(table: Table, bus: Bus) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(
-        struct_size(port_size(port) for port in use.leaf.ports)[0] * len(use.nodes) for use in table.users if use.leaf.ports
+        struct_size(port_size(port) for port in use.leaf.ports)[0] * len(use.nodes)
+        for use in table.users
+        if use.leaf.ports
     )
     rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
     tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)

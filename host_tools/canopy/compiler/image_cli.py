@@ -93,7 +93,9 @@ def command() -> None:
     "--for", "firmware", required=True, type=click.Path(path_type=Path), help="The firmware's NAME.model.json."
 )
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="The image.")
-@click.option("--model", "with_model", is_flag=True, help="Write OUTPUT.model.json and the DBC, too, for the host tools.")
+@click.option(
+    "--model", "with_model", is_flag=True, help="Write OUTPUT.model.json and the DBC, too, for the host tools."
+)
 @click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
 def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: Path | None) -> None:
     """Compile TREE to an image for a firmware.
