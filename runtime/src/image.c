@@ -81,9 +81,9 @@ static canopy_image_error_t check_room(canopy_image_parts_t *image)
     const bool fits[] = {image->node_count <= self->nodes_max, image->parameter_count <= self->parameters_max,
                          image->word_count <= self->words_max, image->text_size <= self->texts_max};
 
-    for (uint16_t what = 0; what < sizeof fits / sizeof fits[0]; what++) {
+    for (size_t what = 0; what < sizeof fits / sizeof fits[0]; what++) {
         if (!fits[what]) {
-            image->where = what;
+            image->where = (uint16_t)what;
             return CANOPY_IMAGE_TOO_LARGE;
         }
     }

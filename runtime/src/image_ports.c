@@ -39,9 +39,9 @@ static bool point_at(const canopy_image_parts_t *image, uint8_t *ports, const ca
         }
         updates = memory + entry->updates;
     }
-    memcpy(ports + port->member, &pointer, sizeof pointer);
+    memcpy(ports + port->member, (const void *)&pointer, sizeof pointer);
     if (port->updates != CANOPY_IMAGE_NONE) {
-        memcpy(ports + port->updates, &updates, sizeof updates);
+        memcpy(ports + port->updates, (const void *)&updates, sizeof updates);
     }
     return true;
 }
@@ -88,7 +88,7 @@ static bool decode_value(const canopy_image_parts_t *image, uint8_t *ports, cons
     case CANOPY_IMAGE_FROM_TEXT: {
         const char *text = image->slot->texts + (value < image->text_size ? (size_t)value : 0u);
 
-        memcpy(ports + port->member, &text, sizeof text);
+        memcpy(ports + port->member, (const void *)&text, sizeof text);
         return form == CANOPY_IMAGE_TEXT && value < image->text_size;
     }
     case CANOPY_IMAGE_FROM_ENTRY:
@@ -96,7 +96,7 @@ static bool decode_value(const canopy_image_parts_t *image, uint8_t *ports, cons
     case CANOPY_IMAGE_FROM_NOTHING: {
         const void *nothing = NULL;
 
-        memcpy(ports + port->member, &nothing, sizeof nothing);
+        memcpy(ports + port->member, (const void *)&nothing, sizeof nothing);
         return form == CANOPY_IMAGE_WRITE;
     }
     default:

@@ -23,8 +23,8 @@ OPTIONS = {
     "features": ["--include", str(ROOT / "tests/unit/features/state.h")],
     "exchange": ["--include", str(ROOT / "tests/unit/exchange/state.h"), "--image-nodes", "33", "--image-uses", "5"],
 }
-# The compiler does not know the user's types: 6 bytes of state in each of two uses of CoolDown; 2 and 1 in each of five that
-# an image may have of Drive and Gate, and 8 in the entry {pose}. Padding may add 7.
+# The compiler does not know the user's types: 6 bytes of state in each of two uses of CoolDown; 2 and 1 in each of five
+# that an image may have of Drive and Gate, and 8 in the entry {pose}. Padding may add 7.
 USER_STATE = {"features": 2 * 6, "exchange": 5 * (2 + 1) + 8}
 
 

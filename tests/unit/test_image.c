@@ -160,7 +160,7 @@ static void resize(size_t at, int change)
     } else {
         memmove(copy + at, copy + at - change, copy_size - at - (size_t)-change);
     }
-    copy_size = (size_t)((int)copy_size + change);
+    copy_size += (size_t)change; /* wraps around below 0, and so takes away */
 }
 
 static canopy_image_error_t load_copy(uint16_t *where)
@@ -210,12 +210,12 @@ static void cycle(void)
 }
 
 typedef struct {
-    uint8_t status[NODES_MAX];
-    exchange_entries_t entries;
     exchange_seen_t seen;
-    uint16_t speed;
+    exchange_entries_t entries;
     uint32_t sent_id;
+    uint16_t speed;
     uint8_t sent[2];
+    uint8_t status[NODES_MAX];
 } record_t;
 
 static record_t records[TICKS];
@@ -427,11 +427,11 @@ static void other_formats_and_engines_are_refused(void)
 static void what_is_too_large_is_refused(void)
 {
     take(exchange_other_bytes, sizeof exchange_other_bytes);
-    resize((size_t)parameters_at(), 27 * 12);
+    resize(parameters_at(), 27 * 12);
     put(AT_NODES, 14 + 27, 2);
     refused(CANOPY_IMAGE_TOO_LARGE, 0);
     take(exchange_other_bytes, sizeof exchange_other_bytes);
-    resize((size_t)parameters_at(), 80 * 4);
+    resize(parameters_at(), 80 * 4);
     put(AT_PARAMETERS, 81, 2);
     refused(CANOPY_IMAGE_TOO_LARGE, 1);
     take(exchange_other_bytes, sizeof exchange_other_bytes);
@@ -446,17 +446,17 @@ static void what_is_too_large_is_refused(void)
 static void what_the_firmware_does_not_have_is_refused(void)
 {
     take(exchange_other_bytes, sizeof exchange_other_bytes);
-    for (uint16_t kind = 0; kind < get(AT_KINDS, 2); kind++) {
+    for (uint16_t kind = 0; kind < (uint16_t)get(AT_KINDS, 2); kind++) {
         copy[kind_at(kind)] ^= 1u;
         refused(CANOPY_IMAGE_KIND, kind);
         copy[kind_at(kind)] ^= 1u;
     }
-    for (uint16_t script = 0; script < get(AT_SCRIPTS, 2); script++) {
+    for (uint16_t script = 0; script < (uint16_t)get(AT_SCRIPTS, 2); script++) {
         copy[script_at(script) + 7u] ^= 1u;
         refused(CANOPY_IMAGE_SCRIPT, script);
         copy[script_at(script) + 7u] ^= 1u;
     }
-    for (uint16_t entry = 0; entry < get(AT_ENTRIES, 2); entry++) {
+    for (uint16_t entry = 0; entry < (uint16_t)get(AT_ENTRIES, 2); entry++) {
         copy[entry_at(entry) + 3u] ^= 1u;
         refused(CANOPY_IMAGE_ENTRY, entry);
         copy[entry_at(entry) + 3u] ^= 1u;
@@ -498,7 +498,7 @@ static void value_refused(uint16_t value, uint32_t source, uint64_t bits, canopy
 
 static uint64_t entry_called(const canopy_image_entry_t *table, size_t offset)
 {
-    for (uint16_t entry = 0; entry < get(AT_ENTRIES, 2); entry++) {
+    for (uint16_t entry = 0; entry < (uint16_t)get(AT_ENTRIES, 2); entry++) {
         for (uint16_t known = 0; known < exchange_image.entry_count; known++) {
             uint64_t hash = get(entry_at(entry), 4) | ((uint64_t)get(entry_at(entry) + 4u, 4) << 32);
             size_t base = (size_t)((uintptr_t)exchange_entries - (uintptr_t)exchange_app.memory);

@@ -142,7 +142,7 @@ class _Writer:
                 raise self._error(
                     script.place(),
                     f'has no such script: {script.attribute}="{script.text}"',
-                    "scripts are C code: an image can use those that the firmware's own tree has, over the same entries",
+                    "scripts are C code: an image can use those that the firmware's own tree has",
                 )
 
     def _check_room(self) -> None:
@@ -184,7 +184,7 @@ class _Writer:
             raise self._error(
                 node.place,
                 f"no use of '{use.leaf.id}' has {' and '.join(fixed)} like this",
-                "signals, texts from entries and constants of your own types must be as in a use in the firmware's tree",
+                "signals, texts from entries and constants of your own types are bound together, as in one use there",
             )
         self._uses.append(base)
         for port, bound in zip(use.leaf.ports, node.bound, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a firmware offers to tree images: for the generated C, and for the model file that images are compiled against."""
+"""What a firmware offers to tree images: for the generated C, and for the model file that images are made from."""
 
 from __future__ import annotations
 

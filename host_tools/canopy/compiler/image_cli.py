@@ -38,7 +38,7 @@ def _fail(text: str) -> None:
 
 
 def _read_model(path: Path) -> dict[str, Any]:
-    """The firmware's model file. (canopy.model reads it for tools that watch, which need a trace.)"""
+    """The firmware's model file. canopy.model reads it for tools that watch, and wants a trace."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -96,9 +96,10 @@ canopy_step_t first_enter(canopy_tree_instance_t *tree, uint16_t node, const exc
                           const first_ports_t *ports)
 {
     uint16_t child = (uint16_t)(node + 1u);
+    uint16_t children = canopy_count_children(tree, node);
 
     (void)in;
-    for (uint16_t place = ports->place % canopy_count_children(tree, node); place > 0u; place--) {
+    for (uint16_t place = 0; place < ports->place && place + 1u < children; place++) {
         child = tree->tree->nodes[child].end;
     }
     return child;
