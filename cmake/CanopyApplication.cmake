@@ -5,11 +5,14 @@
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
-# generated tables, the codec, and your leaves. Link it, and a CAN and a clock driver, into your program:
+# generated tables, the bus with its codec, and your leaves. Link it, and a CAN and a clock driver, into your program:
 #
 #   canopy_add_application(nao_home TREE trees/get_home.xml DBC nao.dbc NODE Controller PERIOD_MS 50 LEAVES home_leaves.c)
 #   add_executable(nao_home main.c)
 #   target_link_libraries(nao_home PRIVATE nao_home_application canopy_clock_posix)
+#
+# All that is generated begins with NAME. Several applications go into one program when each is another NODE of the DBC;
+# two that are the same node do not link: docs/several-trees.md.
 #
 # The generated files, the model file for the host tools among them, are in
 # ${CMAKE_CURRENT_BINARY_DIR}/generated/NAME.
@@ -44,12 +47,10 @@ function(canopy_add_application NAME)
   get_property(compiler GLOBAL PROPERTY CANOPY_COMPILER_SOURCES)
   cmake_path(ABSOLUTE_PATH APP_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(ABSOLUTE_PATH APP_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
-  cmake_path(GET APP_DBC STEM bus)
   cmake_path(GET APP_DBC FILENAME dbc_name)
-  canopy_c_name("${bus}" bus)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
-  set(sources "${folder}/${NAME}_app.c" "${folder}/${bus}_bus.c")
-  set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${bus}_bus.h")
+  set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
+  set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
   foreach(option INCLUDE BITRATE MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
     if(APP_${option})

@@ -2,7 +2,7 @@
 /** @file The robot's side of nao.dbc, in one program with the controller. */
 #include "in_process.h"
 
-#include "nao_bus.h"
+#include "nao_codec.h"
 
 /* Messages of nao.dbc: bytes 0 and 1 are the E2E header. */
 enum { BATTERY_DATA_ID = 256, POSTURE_DATA_ID = 272, CHARGING_BIT = 0x10 };

@@ -154,22 +154,47 @@ void canopy_loop_stop(canopy_loop_t *self, canopy_time_t now)
     canopy_bus_commit(app->bus_state, self->config->can, 0);
 }
 
-void canopy_loop_run(canopy_loop_t *self)
+bool canopy_loop_step(canopy_loop_t *self)
 {
     const canopy_loop_config_t *config = self->config;
     const canopy_clock_t *clock = config->clock;
-    bool more = true;
+    canopy_time_t started = clock->now(clock->context);
+    canopy_status_t root;
 
-    while (more && clock->wait_until(clock->context, self->deadline)) {
-        canopy_time_t started = clock->now(clock->context);
-        canopy_status_t root;
-
-        account_for_start(self, started);
-        root = canopy_loop_cycle(self, started);
-        if (account_for_end(self, started, clock->now(clock->context)) && config->kick_watchdog != NULL) {
-            config->kick_watchdog(config->context);
-        }
-        more = config->after_cycle == NULL || config->after_cycle(config->context, root);
+    account_for_start(self, started);
+    root = canopy_loop_cycle(self, started);
+    if (account_for_end(self, started, clock->now(clock->context)) && config->kick_watchdog != NULL) {
+        config->kick_watchdog(config->context);
     }
-    canopy_loop_stop(self, clock->now(clock->context));
+    return config->after_cycle == NULL || config->after_cycle(config->context, root);
+}
+
+static canopy_loop_t *next_of(canopy_loop_t *const *loops, uint16_t count)
+{
+    canopy_loop_t *next = loops[0];
+
+    for (uint16_t index = 1; index < count; index++) {
+        if (!canopy_time_reached(loops[index]->deadline, next->deadline)) {
+            next = loops[index];
+        }
+    }
+    return next;
+}
+
+void canopy_loop_run_all(canopy_loop_t *const *loops, uint16_t count)
+{
+    const canopy_clock_t *clock = loops[0]->config->clock;
+    canopy_loop_t *next;
+
+    do {
+        next = next_of(loops, count);
+    } while (clock->wait_until(clock->context, next->deadline) && canopy_loop_step(next));
+    for (uint16_t index = 0; index < count; index++) {
+        canopy_loop_stop(loops[index], clock->now(clock->context));
+    }
+}
+
+void canopy_loop_run(canopy_loop_t *self)
+{
+    canopy_loop_run_all(&self, 1);
 }

@@ -50,7 +50,7 @@ static uint32_t accounted(const canopy_bus_counters_t *counters)
 static void receive(canopy_time_t now)
 {
     const canopy_bus_counters_t *counters = &nao_home_app.bus_state->counters;
-    nao_input_t before;
+    nao_home_input_t before;
     canopy_can_frame_t frame;
     uint32_t accepted = counters->accepted;
     uint32_t all = accounted(counters);

@@ -17,6 +17,8 @@ _FLAGS = """
 -Wmissing-prototypes -Wvla -Werror
 """
 WARNINGS = _FLAGS.split()
+# The Arm compiler comes without a C library: the firmware tests' string.h, for memcpy and its like.
+BARE_LIBC = ROOT / "tests" / "firmware" / "support" / "libc"
 VALUES_MAX = 512
 
 

@@ -20,6 +20,13 @@ from types import TracebackType
 _SET_UP = "ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && echo ready && exec cat"
 
 
+# Root needs no user namespace, and in a chroot or a container may not make one.
+_USER = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
+
+NO_ROUTE = ["unshare", *_USER, "--net", "--"]
+"""Starts a command in a network that has no route at all, so that LCM cannot work."""
+
+
 def is_isolated() -> bool:
     """True where only loopback and virtual CAN interfaces exist and the multicast route is there."""
     if any(name != "lo" and not name.startswith(("vcan", "vxcan")) for _, name in socket.if_nameindex()):
@@ -46,17 +53,16 @@ class LcmNetwork:
     def __enter__(self) -> LcmNetwork:
         if is_isolated():
             return self
-        user = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
         # The holder reads its stdin: it ends with the test process, however that ends.
         self._holder = subprocess.Popen(
-            ["unshare", *user, "--net", "sh", "-c", _SET_UP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            ["unshare", *_USER, "--net", "sh", "-c", _SET_UP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         assert self._holder.stdout is not None
         if self._holder.stdout.readline() != "ready\n":
             status = self._holder.wait(10)
             raise RuntimeError(f"no network namespace could be made (unshare and ip ended with status {status})")
         target = f"--target={self._holder.pid}"
-        self._enter = ["nsenter", target, *(["--user", "--preserve-credentials"] if user else []), "--net", "--"]
+        self._enter = ["nsenter", target, *(["--user", "--preserve-credentials"] if _USER else []), "--net", "--"]
         return self
 
     def __exit__(

@@ -135,6 +135,16 @@ class Observer:
             self.poll(0.02)
         return time.monotonic() - start
 
+    def wait_for_ticks(self, ticks: int, stall: float) -> None:
+        """Listens until so many ticks were seen. A loaded machine may be slow, but must not stand still.
+
+        Raises:
+            AssertionError: no further tick within `stall` seconds.
+        """
+        while len(self.views) < ticks:
+            seen = len(self.views)
+            self.wait_for(lambda: len(self.views) > seen, stall)  # noqa: B023  (called at once)
+
     def listen(self, seconds: float) -> None:
         """Listens for a while."""
         end = time.monotonic() + seconds
@@ -166,7 +176,7 @@ def lock_step_has_the_papers_ticks(build_dir: Path, bus: str, name: str) -> Obse
         Simulator(bus, *options) as simulator,
         ControllerProcess(build_dir, name, bus, "--lock-step", "--ticks", str(ticks)) as controller,
     ):
-        observer.wait_for(lambda: len(observer.views) >= ticks - 1, 90)
+        observer.wait_for_ticks(ticks - 1, stall=60)
         report = controller.wait()
         summary = simulator.wait()
         observer.drain()

@@ -17,7 +17,7 @@ import pytest
 
 from canopy.canbus import open_bus
 from canopy.lcm_link import DEFAULT_URL
-from integration.lcm_netns import LcmNetwork
+from integration.lcm_netns import NO_ROUTE, LcmNetwork
 from integration.trace_source import Frame, TraceSource, to_message, write_model
 
 PEER = str(Path(__file__).with_name("lcm_peer.py"))
@@ -132,9 +132,8 @@ def test_silence_publishes_the_tick_at_hand(tmp_path: Path, bus_dir: Path, bus: 
 
 
 def test_without_lcm_it_counts_and_ends_by_itself(tmp_path: Path, bus_dir: Path, bus: can.BusABC) -> None:
-    no_route = ["unshare", "--user", "--map-root-user", "--net"]
     source = TraceSource(4)
-    with Process([*no_route, *bridge_command(write_model(tmp_path), "--duration", "1", "--json")]) as bridge:
+    with Process([*NO_ROUTE, *bridge_command(write_model(tmp_path), "--duration", "1", "--json")]) as bridge:
         wait_for_participants(bus_dir, 2)
         send(bus, source.frames([1, 0, 0, 0]) + source.frames([2, 0, 0, 0]))
         # No trace frames: remote, error, other ids, garbage.

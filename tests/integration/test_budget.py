@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from canopy.cli import main
+from integration.codec_harness import BARE_LIBC
 
 ROOT = Path(__file__).parents[2]
 APPLICATIONS = {
@@ -40,7 +41,7 @@ def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: 
     assert budget is not None
     objects = tmp_path / "app.o"
     target = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-std=c11", "-Os", "-ffreestanding"]
-    includes = [f"-I{ROOT / 'runtime/include'}", f"-I{tmp_path}"]
+    includes = [f"-I{ROOT / 'runtime/include'}", f"-I{BARE_LIBC}", f"-I{tmp_path}"]
     subprocess.run([*target, *includes, "-c", str(tmp_path / f"{name}_app.c"), "-o", str(objects)], check=True)
     symbols = subprocess.run(
         ["arm-none-eabi-nm", "--print-size", "--radix=d", str(objects)], check=True, stdout=subprocess.PIPE, text=True

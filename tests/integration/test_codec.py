@@ -98,6 +98,8 @@ def bus_codec(tmp_path_factory: pytest.TempPathFactory) -> Codec:
         "Controller",
         "--period-ms",
         "50",
+        "--name",
+        "random",
     ]
     result = CliRunner().invoke(main, ["compile", *arguments, "-o", str(folder)])
     assert result.exit_code == 0, result.output

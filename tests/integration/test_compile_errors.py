@@ -212,8 +212,8 @@ def test_the_same_input_gives_the_same_bytes(tmp_path: Path) -> None:
         "main.model.json",
         "main_app.c",
         "main_app.h",
+        "main_bus.c",
+        "main_bus.h",
         "main_leaves.h",
         "nao.dbc",
-        "nao_bus.c",
-        "nao_bus.h",
     ]

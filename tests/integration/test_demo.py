@@ -17,9 +17,7 @@ import pytest
 from canopy.canbus import open_bus
 from canopy.children import ChildError, Children
 from canopy.stop import StopFlag
-from integration.lcm_netns import LcmNetwork
-
-NO_ROUTE = ["unshare", "--user", "--map-root-user", "--net"]
+from integration.lcm_netns import NO_ROUTE, LcmNetwork
 
 
 def demo(build_dir: Path, *options: str) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from canopy.lcm_link import DEFAULT_URL
-from integration.lcm_netns import LcmNetwork
+from integration.lcm_netns import NO_ROUTE, LcmNetwork
 
 OPEN = "import sys; from canopy.lcm_link import open_lcm; print(open_lcm(sys.argv[1], 'tool') is not None)"
 PEER = str(Path(__file__).with_name("lcm_peer.py"))
@@ -34,7 +34,7 @@ def test_with_a_route_it_opens_and_says_nothing() -> None:
 
 
 def test_without_a_route_one_line_says_the_command() -> None:
-    done = run_open(["unshare", "--user", "--map-root-user", "--net"])
+    done = run_open(NO_ROUTE)
     assert done.stdout == "False\n"
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("tool: going on without LCM: no route to the multicast group 239.255.76.67 (")

@@ -16,6 +16,7 @@ def bus(bus_dir: Path) -> str:
 
 
 @pytest.mark.parametrize("name", ["nao_home", "nao_power"])
+@pytest.mark.timeout(600)
 def test_lock_step_has_the_papers_ticks(build_dir: Path, bus: str, name: str) -> None:
     missions.lock_step_has_the_papers_ticks(build_dir, bus, name)
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import signal
 import statistics
@@ -22,7 +21,7 @@ import pytest
 
 from canopy.lcm_link import CHANNEL_ROBOT, CHANNEL_ROBOT_COMMAND, DEFAULT_URL
 from integration import paper
-from integration.lcm_netns import LcmNetwork
+from integration.lcm_netns import NO_ROUTE, LcmNetwork
 from integration.sim_peers import DBC, Controller, Simulator
 
 LCM_PEER = Path(__file__).parent / "lcm_peer.py"
@@ -279,8 +278,7 @@ def test_lcm_commands_and_state(bus: str, controller: Controller) -> None:
 
 
 def test_goes_on_without_lcm_where_no_route_is(bus: str, controller: Controller) -> None:
-    user = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
-    with Simulator(bus, "--lock-step", "--steps", "1", enter=["unshare", *user, "--net", "--"]) as simulator:
+    with Simulator(bus, "--lock-step", "--steps", "1", enter=NO_ROUTE) as simulator:
         controller.receive_message("SimulationStep")
         controller.answer(DO_TASK, SIT_UP)
         out, err = simulator.process.communicate(timeout=20)

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /**
  * @file
- * The bus inside one program: who receives what, full queues, filters, joining and leaving.
+ * The bus inside one program: who receives what, full queues, filters, joining and leaving; a controller below it.
  */
 #include "canopy/can/loopback.h"
 
+#include "fake_can.h"
 #include "unity.h"
 
 #define CAPACITY 4u
@@ -12,6 +13,19 @@
 static canopy_loopback_t bus;
 static canopy_loopback_endpoint_t a, b, c;
 static canopy_can_frame_t storage[3][CAPACITY];
+
+/* A controller that always has a frame. */
+static unsigned fetched;
+
+static int endless_receive(void *context, canopy_can_frame_t *frame)
+{
+    (void)context;
+    fetched++;
+    *frame = (canopy_can_frame_t){.id = 8};
+    return 1;
+}
+
+static const canopy_can_t endless = {.receive = endless_receive};
 
 void setUp(void)
 {
@@ -137,6 +151,68 @@ static void test_join_refuses_bad_arguments(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, &c, storage[2], CAPACITY, &bad));
 }
 
+static void test_with_a_controller_all_see_the_wire_and_each_other(void)
+{
+    fake_can_reset();
+    bus.controller = &fake_can;
+    fake.rx[0] = (canopy_can_frame_t){.id = 0x30, .length = 2, .data = {0x30}};
+    fake.rx[1] = (canopy_can_frame_t){.id = 0x31, .length = 2, .data = {0x31}};
+    fake.rx_count = 2;
+
+    TEST_ASSERT_EQUAL(0x30, receive(&a));
+    TEST_ASSERT_EQUAL(1, send(&a, 0x10));
+    TEST_ASSERT_EQUAL(0x30, receive(&b));
+    TEST_ASSERT_EQUAL(0x10, receive(&b));
+    TEST_ASSERT_EQUAL(0x31, receive(&b));
+    TEST_ASSERT_EQUAL(-1, receive(&b));
+    TEST_ASSERT_EQUAL(0x31, receive(&a));
+    TEST_ASSERT_EQUAL(-1, receive(&a));
+    TEST_ASSERT_EQUAL_UINT(1, fake.tx_count);
+    TEST_ASSERT_EQUAL_HEX32(0x10, fake.tx[0].id);
+    TEST_ASSERT_EQUAL_UINT32(2, stats(&a).received);
+    TEST_ASSERT_EQUAL_UINT32(3, stats(&b).received);
+}
+
+static void test_what_the_controller_does_not_take_nobody_sees(void)
+{
+    fake_can_reset();
+    bus.controller = &fake_can;
+    fake.tx_result = 0;
+    TEST_ASSERT_EQUAL(0, send(&a, 0x10));
+    fake.tx_result = CANOPY_ERROR_BUS_DOWN;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(&a, 0x11));
+    TEST_ASSERT_EQUAL(-1, receive(&b));
+    TEST_ASSERT_EQUAL_UINT32(2, stats(&a).tx_dropped);
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).sent);
+}
+
+static void test_an_error_of_the_controller_is_handed_on(void)
+{
+    canopy_can_frame_t frame;
+
+    fake_can_reset();
+    bus.controller = &fake_can;
+    fake.rx_error = CANOPY_ERROR_BUS_DOWN;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, a.can.receive(a.can.context, &frame));
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).received);
+    canopy_loopback_leave(&b);
+    TEST_ASSERT_EQUAL(-1, receive(&b));
+}
+
+static void test_a_flood_of_what_an_endpoint_does_not_accept_cannot_hold_it_up(void)
+{
+    static const uint32_t ids[] = {7};
+    static const canopy_can_acceptance_t acceptance = {.ids = ids, .count = 1};
+
+    fake_can_reset();
+    bus.controller = &endless;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &c, storage[2], CAPACITY, &acceptance));
+    fetched = 0;
+    TEST_ASSERT_EQUAL(-1, receive(&c));
+    TEST_ASSERT_EQUAL_UINT(CANOPY_LOOPBACK_FETCH, fetched);
+    TEST_ASSERT_EQUAL_UINT32(CANOPY_LOOPBACK_FETCH - CAPACITY, stats(&a).rx_dropped);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -146,5 +222,9 @@ int main(void)
     RUN_TEST(test_frame_that_no_bus_can_carry_is_refused);
     RUN_TEST(test_who_has_left_neither_receives_nor_sends);
     RUN_TEST(test_join_refuses_bad_arguments);
+    RUN_TEST(test_with_a_controller_all_see_the_wire_and_each_other);
+    RUN_TEST(test_what_the_controller_does_not_take_nobody_sees);
+    RUN_TEST(test_an_error_of_the_controller_is_handed_on);
+    RUN_TEST(test_a_flood_of_what_an_endpoint_does_not_accept_cannot_hold_it_up);
     return UNITY_END();
 }

@@ -51,9 +51,9 @@ static void without_sensors_it_commands_stop(void)
     TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
     TEST_ASSERT_EQUAL(CANOPY_SIM_POWER_DO_TASK, run.power_mode);
     TEST_ASSERT_EQUAL(CANOPY_RUNNING, canopy_loop_cycle(&run.loop, run.now + 400000));
-    TEST_ASSERT_EQUAL(NAO_POWER_COMMAND_MODE_DO_TASK, nao_power_output->power_command.mode);
+    TEST_ASSERT_EQUAL(NAO_POWER_POWER_COMMAND_MODE_DO_TASK, nao_power_output->power_command.mode);
     TEST_ASSERT_EQUAL(CANOPY_FAILURE, canopy_loop_cycle(&run.loop, run.now + 500000));
-    TEST_ASSERT_EQUAL(NAO_POWER_COMMAND_MODE_STOP, nao_power_output->power_command.mode);
+    TEST_ASSERT_EQUAL(NAO_POWER_POWER_COMMAND_MODE_STOP, nao_power_output->power_command.mode);
 }
 
 int main(void)

@@ -5,14 +5,47 @@
  */
 #include "canopy/can/loopback.h"
 
+static void hand_to_others(const canopy_loopback_endpoint_t *self, const canopy_can_frame_t *frame)
+{
+    for (canopy_loopback_endpoint_t *peer = self->bus->first; peer != NULL; peer = peer->next) {
+        if (peer != self && canopy_can_accepts(peer->acceptance, frame)) {
+            /* A full queue is the receiver's loss; its ring counts it. */
+            (void)canopy_ring_push(&peer->queue, frame);
+        }
+    }
+}
+
+/** From the controller, for all who accept it. @return as receive: 1 when one of the frames was for self */
+static int fetch(const canopy_loopback_endpoint_t *self, canopy_can_frame_t *frame)
+{
+    const canopy_can_t *controller = self->bus->controller;
+
+    for (unsigned fetched = 0; fetched < CANOPY_LOOPBACK_FETCH; fetched++) {
+        canopy_can_frame_t arrived;
+        const int result = controller->receive(controller->context, &arrived);
+        if (result != 1) {
+            return result;
+        }
+        hand_to_others(self, &arrived);
+        if (canopy_can_accepts(self->acceptance, &arrived)) {
+            *frame = arrived;
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static int loopback_receive(void *context, canopy_can_frame_t *frame)
 {
     canopy_loopback_endpoint_t *self = context;
-    if (!canopy_ring_pop(&self->queue, frame)) {
-        return 0;
+    int result = canopy_ring_pop(&self->queue, frame) ? 1 : 0;
+    if (result == 0 && self->bus != NULL && self->bus->controller != NULL) {
+        result = fetch(self, frame);
     }
-    self->received++;
-    return 1;
+    if (result == 1) {
+        self->received++;
+    }
+    return result;
 }
 
 static int loopback_send(void *context, const canopy_can_frame_t *frame)
@@ -22,12 +55,13 @@ static int loopback_send(void *context, const canopy_can_frame_t *frame)
         self->tx_dropped++;
         return self->bus == NULL ? CANOPY_ERROR_BUS_DOWN : CANOPY_ERROR_ARGUMENT;
     }
-    for (canopy_loopback_endpoint_t *peer = self->bus->first; peer != NULL; peer = peer->next) {
-        if (peer != self && canopy_can_accepts(peer->acceptance, frame)) {
-            /* A full queue is the receiver's loss; its ring counts it. */
-            (void)canopy_ring_push(&peer->queue, frame);
-        }
+    const canopy_can_t *controller = self->bus->controller;
+    const int result = controller != NULL ? controller->send(controller->context, frame) : 1;
+    if (result != 1) {
+        self->tx_dropped++;
+        return result;
     }
+    hand_to_others(self, frame);
     self->sent++;
     return 1;
 }

@@ -196,7 +196,8 @@ class Message:
 class Bus:
     """The bus as `node` sees it. `load` lists (frame length, extended, fd, cycle ms) of every cyclic message on it.
 
-    `node` is "" for a codec of all messages: then each is in `receive` and in `send`.
+    `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `trace` has the node's trace
+    messages by what they are, whatever comes after that in their names.
     """
 
     path: Path

@@ -26,6 +26,8 @@ size value choice fresh int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t
 _TAKEN = frozenset(_WORDS.split())
 _IMAGE_MEMBERS = ("now", "written", "saturated", "halting")
 _BUS_WORDS = ("bus", "bus_h", "codec_h", "input", "output", "rx_messages", "tx_messages", "output_signals")
+# What the application's header adds, with the same prefix.
+_APPLICATION_WORDS = ("period_us", "tree_hash")
 _MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")
 
 
@@ -75,7 +77,7 @@ def name_messages(messages: tuple[Message, ...]) -> tuple[Message, ...]:
     Names of messages come first, so that no signal takes one from them.
     """
     members = {*_TAKEN, *_IMAGE_MEMBERS}
-    everything = set(_BUS_WORDS)
+    everything = {*_BUS_WORDS, *_APPLICATION_WORDS}
     named = []
     for message in messages:
         wanted = snake(message.name)

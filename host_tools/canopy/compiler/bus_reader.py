@@ -31,7 +31,7 @@ from canopy.compiler.bus_model import (
 from canopy.compiler.bus_names import name_messages
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import snake
-from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace
+from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace, trace_kind
 
 __all__ = ["TRACE_LAYOUT", "Bus", "Message", "Signal", "read_bus", "read_messages"]
 
@@ -325,7 +325,13 @@ def _check_node(place: Place, database: Any, node: str) -> None:
 
 
 def _make_bus(
-    path: Path, database: Any, node: str, receive: list[Message], send: list[Message], trace: dict[str, Message]
+    path: Path,
+    database: Any,
+    node: str,
+    receive: list[Message],
+    send: list[Message],
+    trace: dict[str, Message],
+    name: str | None = None,
 ) -> Bus:
     """The bus, with C names, each its own."""
     place = Place(str(path))
@@ -333,7 +339,7 @@ def _make_bus(
     named = {message.name: message for message in name_messages(tuple(known.values()))}
     return Bus(
         path=path,
-        name=snake(path.stem),
+        name=name or snake(path.stem),
         node=node,
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
@@ -345,8 +351,10 @@ def _make_bus(
     )
 
 
-def read_bus(path: Path, node: str, period_ms: int) -> Bus:
+def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> Bus:
     """The bus of a DBC as `node` sees it, for a controller that ticks every `period_ms`.
+
+    `name` is what its C names begin with: the application's, for its tables hold counts of its ticks. Else the file's.
 
     Raises:
         CompileError: the file cannot be read, has no such node, or has something that cannot be compiled.
@@ -359,16 +367,23 @@ def read_bus(path: Path, node: str, period_ms: int) -> Bus:
     send: list[Message] = []
     for message in _by_id(database):
         sent = node in message.senders
-        if message.name in TRACE_LAYOUT and sent:
-            check_trace(place, message)
-            trace[message.name] = _read_message(database, place, message)
+        kind = trace_kind(message.name) if sent else None
+        if kind is not None:
+            check_trace(place, message, kind)
+            if kind in trace:
+                raise CompileError(
+                    place,
+                    f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
+                    "give each node that runs a tree its own",
+                )
+            trace[kind] = _read_message(database, place, message)
         elif sent:
             send.append(_read_message(database, place, message))
         elif any(node in signal.receivers for signal in message.signals):
             receive.append(_read_message(database, place, message))
     for message in receive + send:
         _check_frame(place, message)
-    bus = _make_bus(path, database, node, receive, send, trace)
+    bus = _make_bus(path, database, node, receive, send, trace, name)
     _check_outputs(place, database, bus.send, period_ms)
     return bus
 

@@ -108,8 +108,9 @@ def command(
 ) -> None:
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
 
-    Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), the bus's codec, and NAME.model.json for the tools.
-    Nothing is written when anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
+    Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), NAME_bus.c and NAME_bus.h (the bus and its codec),
+    and NAME.model.json for the tools. Nothing is written when anything is wrong. Exit status: 0 done, 2 the input
+    cannot be compiled.
 
     \b
     Example:

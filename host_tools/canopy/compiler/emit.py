@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import json
 import os
+import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +22,16 @@ from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.image_catalogue import Catalogue
 from canopy.compiler.image_room import exchangeable, image_cost, make_room
-from canopy.compiler.leaf_c import arguments, entry_type, parameters, port_members, prototypes, setters, stale_test
+from canopy.compiler.leaf_c import (
+    arguments,
+    entry_type,
+    function_names,
+    parameters,
+    port_members,
+    prototypes,
+    setters,
+    stale_test,
+)
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
 from canopy.compiler.script.compile import Texts
@@ -104,7 +114,7 @@ def load_application(
         raise CompileError(Place("--name"), f"'{name}' is not a lower-case C identifier", f"for example {snake(name)}")
     options = options or Options(include=include)
     parsed = read_tree(tree, options)
-    bus = read_bus(dbc, node, period_ms)
+    bus = read_bus(dbc, node, period_ms, name)
     table = make_table(parsed, bind(parsed, bus, options, name))
     _check_leaves(table, bus)
     changes_max = min(CHANGES_MAX, -(-len(table.rows) // 2))
@@ -184,6 +194,11 @@ def _short(place: Place) -> str:
     return f"{Path(place.file).name}:{place.line}"
 
 
+def _identifier(text: str) -> str:
+    """Text as the end of a C identifier, in the letters that it has: `nao.dbc` becomes `nao_dbc`."""
+    return re.sub(r"[^0-9A-Za-z]", "_", text)
+
+
 def _exact(place: Place) -> str:
     """`get_home.xml:12:5`, for comments."""
     return f"{_short(place)}:{place.column}"
@@ -199,12 +214,14 @@ def environment(bus: Bus) -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     result.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
+    result.filters["identifier"] = _identifier
     result.globals |= {
         "codec": codec,
         "stale_test": functools.partial(stale_test, bus),
         "parameters_of": parameters,
         "arguments_of": arguments,
         "prototypes_of": prototypes,
+        "function_names_of": function_names,
         "port_members": port_members,
         "setters": setters,
         "entry_type": entry_type,

@@ -69,6 +69,11 @@ def prototypes(leaf: Leaf, bus: Bus) -> list[str]:
     return [f"canopy_status_t {name}_tick({own})"]
 
 
+def function_names(leaf: Leaf, bus: Bus) -> list[str]:
+    """What the user calls these functions."""
+    return [prototype.partition("(")[0].split()[-1] for prototype in prototypes(leaf, bus)]
+
+
 def _spaced(c_type: str) -> str:
     return c_type if c_type.endswith("*") else f"{c_type} "
 

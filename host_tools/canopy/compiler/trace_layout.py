@@ -35,10 +35,19 @@ TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
 }
 
 
-def check_trace(place: Place, message: Any) -> None:
-    """Raises CompileError when a trace message of the DBC has another layout."""
+def trace_kind(name: str) -> str | None:
+    """Which trace message a message of the DBC is by its name: `CanopyTick`, or `CanopyTick_` and any more.
+
+    Names are unique in a DBC, and each node that runs a tree has trace messages of its own.
+    """
+    kind = name.partition("_")[0]
+    return kind if kind in TRACE_LAYOUT else None
+
+
+def check_trace(place: Place, message: Any, kind: str) -> None:
+    """Raises CompileError when a message of the DBC has another layout than the trace message that its name says."""
     layout = {s.name: (s.start, s.length) for s in message.signals if s.byte_order == "little_endian"}
-    wanted = TRACE_LAYOUT[message.name]
+    wanted = TRACE_LAYOUT[kind]
     if message.length != 8 or layout != wanted or any(s.is_signed for s in message.signals):
         rows = ", ".join(f"{name} {start}|{length}@1+" for name, (start, length) in wanted.items())
         raise CompileError(place, f"message '{message.name}' must have 8 bytes and these signals: {rows}")

@@ -8,7 +8,9 @@
  *     canopy_loop_t loop;
  *     if (canopy_loop_init(&loop, &config) == CANOPY_OK) canopy_loop_run(&loop);
  *
- * Threads: everything here runs in one thread. A driver may fill its queue from an interrupt meanwhile.
+ * Several trees in one program are several loops: canopy_loop_run_all() (docs/several-trees.md).
+ *
+ * Threads: everything of one loop runs in one thread. A driver may fill its queue from an interrupt meanwhile.
  */
 #ifndef CANOPY_LOOP_H
 #define CANOPY_LOOP_H
@@ -96,10 +98,28 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
 canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now);
 
 /**
+ * The cycle that is due at `deadline`, now, with all accounts: as canopy_loop_cycle(), and then `deadline` is the next
+ * one. For programs that wait by themselves; call it when the clock has reached `deadline`, not before.
+ * @return false when after_cycle says stop; the tree is not halted then: canopy_loop_stop() does it.
+ */
+bool canopy_loop_step(canopy_loop_t *self);
+
+/**
  * Cycles at the period until the clock or after_cycle says stop, then halts the tree and commits its last outputs once.
  * Deadlines are absolute: lateness does not add up. After an overrun the cycles that are past are left out.
  */
 void canopy_loop_run(canopy_loop_t *self);
+
+/**
+ * canopy_loop_run() for several loops in one thread, each at its own period: always the one whose deadline is first; of
+ * several due together, the first in the list. A cycle is not interrupted, so it delays those that become due meanwhile:
+ * that counts as their lateness, and as an overrun when they are not done in time. One that says stop stops all.
+ *
+ * @param loops set up, each with an application of its own, and all with the same clock. Their first deadlines, and so
+ *              their phases, are when they were set up; add an offset to `deadline` before the run for others.
+ * @param count >= 1. O(count) more for each cycle.
+ */
+void canopy_loop_run_all(canopy_loop_t *const *loops, uint16_t count);
 
 /**
  * Halts the tree and sends the outputs that result: safe values, unless a halt handler wrote others.

@@ -1,11 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /**
  * @file
- * A CAN bus inside one program: several endpoints joined; a frame that one sends, all others receive. For tests,
- * simulations in the same process, and two trees on one microcontroller. Needs no operating system.
+ * A CAN bus inside one program: several endpoints joined; a frame that one sends, all others receive. For tests, and
+ * simulations in the same process. Needs no operating system.
  *
- * Threads: all endpoints of a bus are used by one thread; or the bus has exactly two endpoints, and each of them has a
- * thread (or an interrupt) of its own. More senders than that would make several producers for one ring.
+ * With a controller below it, it is how several trees share that: each has an endpoint, and sees what comes from the
+ * wire and what the others send. What an endpoint sends goes to the wire first, and to the others if that took it.
+ *
+ *     static canopy_loopback_t bus = {.controller = &board_can};
+ *
+ * Threads: all endpoints of a bus are used by one thread; or the bus has exactly two endpoints and no controller, and
+ * each of them has a thread (or an interrupt) of its own. More senders than that would make several producers for one ring.
  * Joining and leaving happens while nobody sends.
  *
  * Blocking and memory: nothing blocks or allocates; wait is NULL. The queues are the caller's.
@@ -18,12 +23,21 @@
 #include "canopy/ring.h"
 #include "canopy/status.h"
 
+/** Most frames that one receive fetches from the controller, so that a flooded bus cannot hold it up. */
+#define CANOPY_LOOPBACK_FETCH 64u
+
 /** One participant. Owned by the caller, stays where it is while joined; members but `can` are private. */
 typedef struct canopy_loopback_endpoint canopy_loopback_endpoint_t;
 
-/** The bus. Owned by the caller; a zeroed one (`= {0}`) has no participants. */
+/** The bus. Owned by the caller; a zeroed one (`= {0}`) has no participants, and no controller. */
 typedef struct {
     canopy_loopback_endpoint_t *first;
+    /**
+     * The way to the wire, or NULL: then the bus ends in the program. Nobody else takes frames from it. Endpoints fetch
+     * from it while their own queue is empty, so each must take its own often enough for the queues of the slower ones:
+     * a queue holds what comes in one period of its owner.
+     */
+    const canopy_can_t *controller;
 } canopy_loopback_t;
 
 struct canopy_loopback_endpoint {
@@ -47,8 +61,12 @@ struct canopy_loopback_endpoint {
  * @param acceptance  filter, which lives as long as the endpoint; NULL: every frame
  * @return CANOPY_OK, or CANOPY_ERROR_ARGUMENT.
  *
- * Send: O(endpoints). It always takes a valid frame; for a participant whose queue is full the frame is lost and
- * counted there (rx_dropped), as on a real bus. CANOPY_ERROR_ARGUMENT for a frame that cannot exist on a bus.
+ * Send: O(endpoints). It always takes a valid frame, unless the controller does not (its answer is handed on); for a
+ * participant whose queue is full the frame is lost and counted there (rx_dropped), as on a real bus.
+ * CANOPY_ERROR_ARGUMENT for a frame that cannot exist on a bus.
+ *
+ * Receive: at most CANOPY_LOOPBACK_FETCH frames are fetched from the controller, O(endpoints) each, until one is for this
+ * endpoint. An error of the controller is handed on, to the endpoint that came across it.
  */
 canopy_error_t canopy_loopback_join(canopy_loopback_t *bus, canopy_loopback_endpoint_t *endpoint,
                                     canopy_can_frame_t *storage, uint32_t capacity,
