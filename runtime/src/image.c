@@ -262,12 +262,15 @@ canopy_image_error_t canopy_image_load(const canopy_image_app_t *self, const uin
 }
 
 /** Stops what runs and starts the tree of `slot` - 1, or the firmware's own (0). */
-static void exchange(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now, uint8_t slot)
+static canopy_error_t exchange(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now, uint8_t slot)
 {
     const canopy_app_t *app = self->app;
     const canopy_tree_t *tree = slot != 0u ? &self->state->trees[slot - 1u] : app->tree;
     const uint32_t faults = app->tree_instance->faults;
 
+    if (loop->config->app != app) {
+        return CANOPY_ERROR_ARGUMENT;
+    }
     canopy_loop_stop(loop, now);
     app->start(app->memory);
     self->state->running = slot;
@@ -277,23 +280,23 @@ static void exchange(const canopy_image_app_t *self, canopy_loop_t *loop, canopy
     for (uint16_t node = 0; node < tree->node_count; node++) {
         app->sent[node] = (uint8_t)CANOPY_IDLE;
     }
+    return CANOPY_OK;
 }
 
 canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now)
 {
     uint8_t slot = self->state->loaded;
+    canopy_error_t error = slot != 0u ? exchange(self, loop, now, slot) : CANOPY_ERROR_NOT_FOUND;
 
-    if (slot == 0u) {
-        return CANOPY_ERROR_NOT_FOUND;
+    if (error == CANOPY_OK) {
+        self->state->loaded = 0;
     }
-    self->state->loaded = 0;
-    exchange(self, loop, now, slot);
-    return CANOPY_OK;
+    return error;
 }
 
-void canopy_image_run_own(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now)
+canopy_error_t canopy_image_run_own(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now)
 {
-    exchange(self, loop, now, 0);
+    return exchange(self, loop, now, 0);
 }
 
 uint64_t canopy_image_running(const canopy_image_app_t *self)

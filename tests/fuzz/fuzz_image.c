@@ -233,7 +233,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t length)
         }
         cycles(take8(&input) % 24u);
         if (take8(&input) % 4u == 0u) {
-            canopy_image_run_own(&exchange_image, &loop, time);
+            EXPECT(canopy_image_run_own(&exchange_image, &loop, time) == CANOPY_OK);
             cycles(2);
         }
     }

@@ -266,7 +266,7 @@ static void the_image_of_the_own_tree_ticks_as_the_tree(void)
     load_and_run(exchange_main_bytes, sizeof exchange_main_bytes);
     TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == EXCHANGE_TREE_HASH);
     run_for_records(true);
-    canopy_image_run_own(&exchange_image, &loop, time);
+    TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run_own(&exchange_image, &loop, time));
     TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == 0u);
     run_for_records(true);
     /* Twice more, so that both buffers have run. */
@@ -362,6 +362,23 @@ static void what_runs_goes_on_while_another_is_refused_or_loaded(void)
         TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK, canopy_image_load(&exchange_image, exchange_other_bytes,
                                                                  sizeof exchange_other_bytes, NULL));
     }
+}
+
+static void an_image_is_not_run_in_the_loop_of_another_application(void)
+{
+    canopy_app_t other_app = exchange_app;
+    const canopy_loop_config_t other_config = {.app = &other_app, .can = &fake_can, .clock = &fake_clock};
+    canopy_loop_t other = {.config = &other_config};
+
+    cycle();
+    fake.tx_count = 0;
+    TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK,
+                          canopy_image_load(&exchange_image, exchange_other_bytes, sizeof exchange_other_bytes, NULL));
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_ARGUMENT, canopy_image_run(&exchange_image, &other, time));
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_ARGUMENT, canopy_image_run_own(&exchange_image, &other, time));
+    TEST_ASSERT_EQUAL_UINT(0, fake.tx_count);
+    TEST_ASSERT_EQUAL_PTR(exchange_app.tree, exchange_app.tree_instance->tree);
+    TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&exchange_image, &loop, time)); /* it is still loaded */
 }
 
 static void an_image_may_lie_at_any_address(void)
@@ -690,6 +707,7 @@ int main(void)
     RUN_TEST(another_tree_runs_with_its_own_ports);
     RUN_TEST(the_tree_that_ran_is_halted_and_all_begins_again);
     RUN_TEST(what_runs_goes_on_while_another_is_refused_or_loaded);
+    RUN_TEST(an_image_is_not_run_in_the_loop_of_another_application);
     RUN_TEST(an_image_may_lie_at_any_address);
     RUN_TEST(null_pointers_are_refused);
     RUN_TEST(every_other_length_is_refused);

@@ -62,6 +62,7 @@ class _Writer:
         self._name = name
         self._catalogue = Catalogue(table, Room(0, 0, 0, 0, 0))  # for the hashes; an image has no room itself
         self._entries = {id(entry): place for place, entry in enumerate(table.bindings.entries)}
+        self._counted = {entry["signature"]: entry["counted"] for entry in firmware["entries"]}
         self._kinds = {kind["id"]: kind for kind in firmware["kinds"]}
         self._numbers = {use.leaf.id: number for number, use in enumerate(table.users)}
         self._next = dict.fromkeys(self._numbers, 0)
@@ -131,14 +132,15 @@ class _Writer:
                     f"'{leaf.id}' is declared differently there",
                     f"there: {known['signature']}\n        here: {leaf_signature(leaf)}",
                 )
-        entries = {entry["signature"]: entry["name"] for entry in self._firmware["entries"]}
+        names = [entry["name"] for entry in self._firmware["entries"]]
         for entry in self._table.bindings.entries:
-            if entry_signature(entry) not in entries:
-                same = [signature for signature, name in entries.items() if name == entry.name]
-                there = f"there: {'; '.join(same)}" if same else nearest(entry.name, entries.values())
+            if entry_signature(entry) not in self._counted:
+                same = [e["signature"] for e in self._firmware["entries"] if e["name"] == entry.name]
+                there = f"there: {'; '.join(same)}" if same else nearest(entry.name, names)
                 raise self._error(entry.place, f"has no entry {{{entry.name}}}: {entry_signature(entry)}", there)
+        scripts = set(self._firmware["scripts"])
         for script, number in zip(self._table.scripts, self._catalogue.script_hashes(), strict=True):
-            if f"{number:016x}" not in self._firmware["scripts"]:
+            if f"{number:016x}" not in scripts:
                 raise self._error(
                     script.place(),
                     f'has no such script: {script.attribute}="{script.text}"',
@@ -195,8 +197,7 @@ class _Writer:
         if is_fixed(port, bound):
             return FROM_BASE, 0
         if isinstance(target, Entry):
-            there = {entry["signature"]: entry["counted"] for entry in self._firmware["entries"]}
-            if port.writes and there[entry_signature(target)] and port.name not in counted:
+            if port.writes and self._counted[entry_signature(target)] and port.name not in counted:
                 raise self._error(
                     bound.place,
                     f"a node there waits for updates of {{{target.name}}}, and port '{port.name}' does not count them",

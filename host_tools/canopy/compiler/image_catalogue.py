@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from canopy.compiler.image_names import (
     base_signature,
@@ -32,9 +33,13 @@ class Catalogue:
         """See image_names.engine_hash()."""
         return engine_hash()
 
+    @cached_property
+    def _kinds(self) -> dict[str, int]:
+        return {use.leaf.id: number for number, use in enumerate(self.table.users)}
+
     def kind(self, use: LeafUse) -> int:
         """The kind's number: its place in the catalogue."""
-        return self.table.users.index(use)
+        return self._kinds[use.leaf.id]
 
     def kind_hash(self, use: LeafUse) -> int:
         """Of the kind's signature."""
@@ -55,15 +60,16 @@ class Catalogue:
         """Of each entry."""
         return [hash64(entry_signature(entry)) for entry in self.table.bindings.entries]
 
-    @property
-    def types(self) -> list[str]:
-        """The types of ports and entries: a type's place here is its number."""
+    @cached_property
+    def types(self) -> dict[str, int]:
+        """The types of ports and entries, and their numbers."""
         ports = {type_signature(port.type) for use in self.table.users for port in use.leaf.ports}
-        return sorted(ports | {type_signature(entry.type) for entry in self.table.bindings.entries})
+        entries = {type_signature(entry.type) for entry in self.table.bindings.entries}
+        return {signature: number for number, signature in enumerate(sorted(ports | entries))}
 
     def type_of(self, kind: PortType) -> int:
         """The type's number."""
-        return self.types.index(type_signature(kind))
+        return self.types[type_signature(kind)]
 
     @staticmethod
     def form(port: Port) -> str:

@@ -153,12 +153,13 @@ canopy_image_error_t canopy_image_load(const canopy_image_app_t *self, const uin
  * the loaded image begin with the next cycle: every entry has its first value, every leaf's state is 0. Counters go on.
  *
  * @param now [us], as for canopy_loop_cycle()
- * @return CANOPY_OK; CANOPY_ERROR_NOT_FOUND when none is loaded (then nothing is changed). O(nodes + messages).
+ * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT when it is another application's loop, CANOPY_ERROR_NOT_FOUND when no image
+ *         is loaded: then nothing is changed. O(nodes + messages).
  */
 canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now);
 
-/** The same with the firmware's own tree. */
-void canopy_image_run_own(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now);
+/** The same with the firmware's own tree; that is always there. */
+canopy_error_t canopy_image_run_own(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now);
 
 /** The hash of the image that runs, as `canopy image show` prints it; 0 while the firmware's own tree runs. */
 uint64_t canopy_image_running(const canopy_image_app_t *self);
