@@ -4,7 +4,7 @@
  * Any image at the application of tests/unit/exchange: what canopy_image_load() refuses changes nothing that runs, what it
  * accepts ticks, is halted and exchanged without leaving its memory.
  *
- * Inputs are raw images, or the two good ones with some bytes changed, records copied and parts cut out. Size and CRC are
+ * Inputs are raw images, or the two good ones with some leaves doubled, bytes changed, records copied and parts cut out. Size and CRC are
  * put right mostly, so that the search gets past them. Every image is loaded twice: into buffers that stand alone, where
  * the address sanitizer sees each byte too many, and into the application's own, in which it then runs.
  */
@@ -111,6 +111,78 @@ static void edit(void)
     }
 }
 
+static size_t get16(size_t at)
+{
+    return image[at] | ((size_t)image[at + 1u] << 8);
+}
+
+static void insert_copy(size_t from, size_t length)
+{
+    memmove(image + from + length, image + from, size - from);
+    size += length;
+}
+
+static bool is_user_node(size_t at)
+{
+    return image[at] <= CANOPY_NODE_STATEFUL_ACTION || image[at] >= CANOPY_NODE_USER_CONTROL;
+}
+
+/** How many ports the kind has that stands at this place in the image. */
+static size_t ports_of(size_t kinds, size_t kind)
+{
+    for (uint16_t known = 0; known < exchange_image.kind_count; known++) {
+        uint64_t hash = 0;
+
+        for (unsigned byte = 0; byte < 8u; byte++) {
+            hash |= (uint64_t)image[kinds + 8u * kind + byte] << (8u * byte);
+        }
+        if (exchange_image.kinds[known].hash == hash) {
+            return exchange_image.kinds[known].port_count;
+        }
+    }
+    return 0;
+}
+
+/** In an image that is good: a leaf once more, as its own next sibling, with a use and values of its own. */
+static void repeat_leaf(void)
+{
+    size_t count = get16(32);
+    size_t leaf = take8(&input) % count;
+    size_t at = CANOPY_IMAGE_HEADER + 12u * leaf;
+    size_t kinds = CANOPY_IMAGE_HEADER + 12u * count + 4u * get16(34);
+    size_t uses = kinds + 8u * (get16(38) + get16(40) + get16(42));
+    size_t values = uses + 8u * get16(44);
+    size_t ports = get16(at + 8u) != 0xFFFFu ? ports_of(kinds, get16(at + 8u)) : 0u;
+
+    if (!is_user_node(at) || get16(at + 4u) != leaf + 1u || size + 128u > sizeof image) {
+        return;
+    }
+    for (size_t before = CANOPY_IMAGE_HEADER; before < at; before += 12u) {
+        if (is_user_node(before) && get16(before + 8u) != 0xFFFFu) {
+            uses += 8u;
+            values += 12u * ports_of(kinds, get16(before + 8u));
+        }
+    }
+    if (get16(at + 8u) != 0xFFFFu) {
+        insert_copy(values, 12u * ports);
+        insert_copy(uses, 8);
+        put(44, get16(44) + 1u, 2);
+        put(48, get16(48) + ports, 2);
+    }
+    insert_copy(at, 12);
+    put(32, count + 1u, 2);
+    for (size_t node = 0; node <= count; node++) {
+        size_t row = CANOPY_IMAGE_HEADER + 12u * node;
+
+        if (node != leaf && get16(row + 4u) > leaf) {
+            put(row + 4u, get16(row + 4u) + 1u, 2);
+        }
+        if (get16(row + 2u) > leaf) {
+            put(row + 2u, get16(row + 2u) + 1u, 2);
+        }
+    }
+}
+
 static void seal(void)
 {
     uint32_t crc = UINT32_MAX;
@@ -143,6 +215,9 @@ static void make_image(void)
 
         size = kind % 4u == 1u ? sizeof exchange_main_bytes : sizeof exchange_other_bytes;
         memcpy(image, good, size);
+        for (unsigned leaves = take8(&input) % 8u; leaves > 0u; leaves--) {
+            repeat_leaf();
+        }
         for (unsigned edits = take8(&input) % (unsigned)EDITS; edits > 0u && size > 16u; edits--) {
             edit();
         }
