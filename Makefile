@@ -11,7 +11,7 @@ FUZZ_SECONDS ?= 60
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage fuzz proof test-portable
+.PHONY: coverage golden fuzz proof test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -45,6 +45,9 @@ test-python: # Python and integration tests that need no CAN interface
 
 test-rig: # integration tests on vcan0: one guest for all of them
 	$(PYTHON) tests/rig/with-vcan --timeout 1800 --mem 1G -- $(PYTEST) -m rig
+
+golden: ## write tests/golden anew from what the compiler makes now; read the diff before you commit it
+	CANOPY_UPDATE_GOLDEN=1 $(PYTEST) tests/integration/test_golden.py
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint

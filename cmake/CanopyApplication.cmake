@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
 #                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [TYPE_MAP "C++ type=C type"…]
+#                        [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
@@ -35,7 +36,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
-                        "LEAVES;TYPE_MAP")
+                        "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
       message(FATAL_ERROR "canopy_add_application(${NAME}): ${required} is missing")
@@ -64,6 +65,11 @@ function(canopy_add_application NAME)
   endif()
   foreach(pair IN LISTS APP_TYPE_MAP)
     list(APPEND options --type-map "${pair}")
+  endforeach()
+  foreach(pair IN LISTS APP_ROS_PACKAGE) # the build runs elsewhere
+    string(REGEX MATCH "^([^=]*)=(.*)$" matched "${pair}")
+    cmake_path(ABSOLUTE_PATH CMAKE_MATCH_2 BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+    list(APPEND options --ros-package "${CMAKE_MATCH_1}=${CMAKE_MATCH_2}")
   endforeach()
   add_custom_command(
     OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"

@@ -22,6 +22,7 @@
 #include "nodes/sequence.h"
 #include "nodes/sequence_with_memory.h"
 #include "nodes/switch.h"
+#include "nodes/test_node.h"
 #include "nodes/timeout.h"
 #include "nodes/try_catch.h"
 #include "nodes/user.h"
@@ -121,6 +122,8 @@ static CANOPY_SELDOM canopy_step_t enter(canopy_tree_instance_t *self, canopy_in
         return canopy_entry_updated_enter(self, node, CANOPY_RUNNING);
     case CANOPY_NODE_WAS_ENTRY_UPDATED:
         return canopy_was_entry_updated_enter(self, node);
+    case CANOPY_NODE_TEST_NODE:
+        return canopy_test_node_enter(self, node);
     case CANOPY_NODE_LOOP:
         return canopy_loop_enter(self, node);
     case CANOPY_NODE_SWITCH:
@@ -204,6 +207,7 @@ static CANOPY_SELDOM canopy_step_t child_done(canopy_tree_instance_t *self, cano
     case CANOPY_NODE_ALWAYS_FAILURE:
     case CANOPY_NODE_SLEEP:
     case CANOPY_NODE_WAS_ENTRY_UPDATED:
+    case CANOPY_NODE_TEST_NODE:
     case CANOPY_NODE_TYPES: /* not covered: no type */
         break;
     }
@@ -219,6 +223,9 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
         break;
     case CANOPY_NODE_ATTRIBUTES:
         canopy_attributes_halt(self, node);
+        break;
+    case CANOPY_NODE_TRY_CATCH:
+        canopy_try_catch_halt(self, node);
         break;
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
@@ -241,7 +248,6 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_REACTIVE_PARALLEL:
     case CANOPY_NODE_IF_THEN_ELSE:
     case CANOPY_NODE_WHILE_DO_ELSE:
-    case CANOPY_NODE_TRY_CATCH:
     case CANOPY_NODE_INVERTER:
     case CANOPY_NODE_FORCE_SUCCESS:
     case CANOPY_NODE_FORCE_FAILURE:
@@ -255,6 +261,7 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_SKIP_UNLESS_UPDATED:
     case CANOPY_NODE_WAIT_VALUE_UPDATE:
     case CANOPY_NODE_WAS_ENTRY_UPDATED:
+    case CANOPY_NODE_TEST_NODE:
     case CANOPY_NODE_LOOP:
     case CANOPY_NODE_SWITCH:
     case CANOPY_NODE_TYPES:

@@ -34,10 +34,10 @@ static bool status_fits(const canopy_tree_t *tree, const canopy_node_t *node, un
     return status > (int32_t)CANOPY_IDLE && status <= (int32_t)CANOPY_SKIPPED;
 }
 
-/** All parameters of an Attributes node are scripts, or none. */
-static bool attributes_fit(const canopy_tree_t *tree, const canopy_node_t *node)
+/** All parameters of the node from `first` on are scripts, or none. */
+static bool scripts_fit(const canopy_tree_t *tree, const canopy_node_t *node, unsigned first)
 {
-    for (unsigned which = 0; which < shapes[CANOPY_NODE_ATTRIBUTES].parameters; which++) {
+    for (unsigned which = first; which < shapes[node->type].parameters; which++) {
         if (!script_fits(tree, node, which, -1)) {
             return false;
         }
@@ -73,7 +73,10 @@ static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
     }
 
     if (type == (uint8_t)CANOPY_NODE_ATTRIBUTES) {
-        return attributes_fit(tree, node);
+        return scripts_fit(tree, node, 0);
+    }
+    if (type == (uint8_t)CANOPY_NODE_TEST_NODE) {
+        return status_fits(tree, node, 0) && scripts_fit(tree, node, 2);
     }
     if (type == (uint8_t)CANOPY_NODE_PRECONDITION || type == (uint8_t)CANOPY_NODE_LOOP) {
         return script_fits(tree, node, 0, 0) && status_fits(tree, node, 1);
@@ -147,6 +150,21 @@ static bool children_fit(const canopy_tree_t *tree, uint16_t index, const canopy
     return children >= shape->least && children <= shape->most;
 }
 
+/** The last child of a TryCatch that ticks it when it is halted is a leaf with functions. */
+static bool handler_fits(const canopy_tree_t *tree, uint16_t index)
+{
+    const canopy_node_t *node = &tree->nodes[index];
+    uint16_t handler = (uint16_t)(index + 1u);
+
+    if (node->type != (uint8_t)CANOPY_NODE_TRY_CATCH || (node->asks == 0u && tree->parameters[node->parameter] == 0)) {
+        return true;
+    }
+    while (tree->nodes[handler].end != node->end) {
+        handler = tree->nodes[handler].end;
+    }
+    return tree->nodes[handler].type <= (uint8_t)CANOPY_NODE_STATEFUL_ACTION;
+}
+
 canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_node)
 {
     uint32_t words_end = 0;
@@ -163,7 +181,8 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
         /* Only the root's place is looked at here: every later node is a child of one that children_fit() accepted. */
         if ((index == 0u && (node->parent != 0u || node->end != tree->node_count)) ||
             node->type >= (uint8_t)CANOPY_NODE_TYPES || !words_fit(tree, node, &words_end) ||
-            !fields_fit(tree, node, &shapes[node->type]) || !children_fit(tree, index, &shapes[node->type])) {
+            !fields_fit(tree, node, &shapes[node->type]) || !children_fit(tree, index, &shapes[node->type]) ||
+            !handler_fits(tree, index)) {
             if (bad_node != NULL) {
                 *bad_node = index;
             }

@@ -178,6 +178,8 @@ class Generator:
             # For ever only over what can yield (rule 8).
             yields = any(spec.kind == "StatefulAction" for child in children for spec in child.walk())
             return rng.choice((-1, -1, 0, 1, 2, 3, 5) if yields else (0, 1, 2, 3, 5))
+        if name == "catch_on_halt":
+            return rng.randint(0, 1) if children[-1].kind in USER_LEAVES else 0
         if name == "then_skip":
             return rng.randint(0, 1)
         if name in ("msec", "delay_msec"):

@@ -54,7 +54,7 @@ SHAPES: dict[str, Shape] = {
     "ReactiveParallel": Shape(1, MANY, ("success_count",)),
     "IfThenElse": Shape(2, 3),
     "WhileDoElse": Shape(2, 3),
-    "TryCatch": Shape(2, MANY, ()),
+    "TryCatch": Shape(2, MANY, ("catch_on_halt",)),
     "Inverter": Shape(1, 1),
     "ForceSuccess": Shape(1, 1),
     "ForceFailure": Shape(1, 1),

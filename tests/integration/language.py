@@ -21,6 +21,12 @@ MODEL = """\
 <input_port name="speed" type="int"/><MetadataFields><Metadata kind="SyncAction"/></MetadataFields></Action>
 <Action ID="Find"><output_port name="goal" type="int16_t"/></Action>
 <Action ID="Say"><input_port name="text" type="std::string"/><input_port name="any" default="3"/></Action>
+<Action ID="Measure"><output_port name="level" type="int16_t/10"/></Action>
+<Action ID="Fine"><input_port name="level" type="int16_t*0.01"/></Action>
+<Action ID="Tenth"><input_port name="level" type="int16_t * 0.3"/></Action>
+<Action ID="Choose"><output_port name="colour" type="std::string"/></Action>
+<Action ID="Name"><output_port name="it" type="std::string[3]"/>
+<MetadataFields><Metadata texts="a;b"/></MetadataFields></Action>
 <Control ID="Pick"><input_port name="first" type="uint8_t" default="0"/></Control>
 <Decorator ID="Guard"/>"""
 

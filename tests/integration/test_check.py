@@ -30,6 +30,7 @@ MODEL = """\
     <Action ID="Track"><MetadataFields><Metadata returns="RUNNING"/></MetadataFields></Action>
     <Action ID="Fails"><MetadataFields><Metadata returns="FAILURE"/></MetadataFields></Action>
     <Action ID="Recharge"><MetadataFields><Metadata moves="Battery.Level"/></MetadataFields></Action>
+    <Action ID="Charges"><MetadataFields><Metadata moves="B.L"/></MetadataFields></Action>
     <Action ID="OpenDoor"/>
     <Action ID="PassDoor"/>
     <Action ID="CloseDoor"/>
@@ -40,7 +41,7 @@ MODEL = """\
     <Action ID="Walk"><input_port name="speed" type="int" default="3"/></Action>"""
 
 TREE = """\
-<root BTCPP_format="4">
+<root BTCPP_format="4" main_tree_to_execute="Main">
   <BehaviorTree ID="Main">
     {nodes}
   </BehaviorTree>
@@ -103,6 +104,22 @@ CASES = [
      "<ReactiveFallback><Rested/><Recharge/></ReactiveFallback>"),
     ("no-hysteresis", "<ReactiveFallback><BatteryOk/><Recharge/></ReactiveFallback>", "chattering",
      "<Fallback><BatteryOk/><Recharge/></Fallback>"),
+    ("no-hysteresis",
+     "<ReactiveFallback><ScriptCondition code='!Bus.fresh || Battery.Level &gt; 20'/><Recharge/></ReactiveFallback>",
+     "<ScriptCondition> decides whether <Recharge> runs, which moves 'Battery.Level'",
+     "<ReactiveFallback><ScriptCondition code='Battery.Level &gt; (full ? 20 : 9)'/><Recharge/></ReactiveFallback>"),
+    ("no-hysteresis",
+     "<ReactiveFallback><ScriptCondition code='B.L &lt; 2 || Up == B.M'/><Charges/></ReactiveFallback>",
+     "moves 'B.L'",
+     "<ReactiveFallback><ScriptCondition code='Battery.Level &gt; 20 || @mode == 1'/><Recharge/></ReactiveFallback>"),
+    ("no-hysteresis", "<WhileDoElse><ScriptCondition code='20 &lt; Battery.Level'/><Go/><Recharge/></WhileDoElse>",
+     "chattering",
+     "<WhileDoElse><ScriptCondition code='Battery.Level == 20'/><Go/><Recharge/></WhileDoElse>"),
+    ("no-hysteresis", "<Recharge _while='Battery.Level &lt; 20'/>",
+     "_while=\"Battery.Level < 20\" decides whether <Recharge> runs",
+     "<Recharge _skipIf='Battery.Level &gt; 20'/>"),
+    ("no-hysteresis", "<Recharge _while='Battery.Level &lt; 20'/>", "chattering",
+     "<Recharge _while='Battery.Current &lt; 20'/>"),
     ("unbounded-retry", "<RetryUntilSuccessful num_attempts='-1'><Blink/></RetryUntilSuccessful>", "has no end",
      "<RetryUntilSuccessful num_attempts='-1'><Go/></RetryUntilSuccessful>"),
     ("unbounded-retry", "<Repeat num_cycles='-1'><Ready/></Repeat>", "has no end",
@@ -117,6 +134,9 @@ CASES = [
      "<Fallback><Go/><Stop/></Fallback>"),
     ("root-can-fail", "<Fallback><Go/><Speak/></Fallback>", "'Main' can return FAILURE",
      "<Fallback><Go/><Stop/></Fallback>"),
+    ("unused-tree", "<Go/></BehaviorTree><BehaviorTree ID='Spare'><Go/>",
+     "tree 'Spare' is no part of the main tree 'Main'",
+     "<SubTree ID='Spare'/></BehaviorTree><BehaviorTree ID='Spare'><Go/>"),
     ("unused-port", "<Sequence><Walk/><Walk/></Sequence>",
      "port 'speed' of 'Walk' is left at its default by its 2 uses",
      "<Sequence><Walk speed='5'/><Walk/></Sequence>"),
@@ -157,7 +177,24 @@ def test_a_tree_of_every_construct_with_the_compilers_options_about_types() -> N
     assert run(language / "main.xml", "--include", "state.h").exit_code == 0
     result = run(*arguments, "--include", "state.h")
     assert result.exit_code == 0
-    assert result.output.endswith("2 notes\n")
+    assert result.output.endswith("1 note\n")
+
+
+def test_trees_that_are_not_used_are_checked_too(tmp_path: Path) -> None:
+    spare = (
+        "<Go/></BehaviorTree>\n<BehaviorTree ID='Inner'><ForceSuccess><Go/></ForceSuccess></BehaviorTree>"
+        "\n<BehaviorTree ID='Spare'><Sequence><SubTree ID='Inner'/><Walk/></Sequence></BehaviorTree>"
+        "\n<BehaviorTree ID='Draft'><Gp/>"
+    )
+    result = run(write(tmp_path, spare), "--disable", "root-can-fail", "-q")
+    assert [line.split(":", 1)[1] for line in result.output.splitlines()[:-1]] == [
+        "4:1: note: tree 'Inner' is no part of the main tree 'Main' [unused-tree]",
+        "4:26: warning: <ForceSuccess> hides that <Go> can fail [hidden-failure]",
+        "5:1: note: tree 'Spare' is no part of the main tree 'Main' [unused-tree]",
+        "6:1: note: tree 'Draft' is no part of the main tree 'Main' [unused-tree]",
+        "6:26: note: tree 'Draft' is not used, and would not compile: unknown node 'Gp' [unused-tree]",
+    ]
+    assert run(write(tmp_path, spare), "--disable", "unused-tree", "-q").output.count("hidden-failure") == 0
 
 
 def test_floating_point_and_types_of_the_users_own(tmp_path: Path) -> None:

@@ -118,7 +118,12 @@ def test_a_wrong_declaration_of_a_leaf_is_named(tmp_path: Path, model: str, text
         (b"<root BTCPP_format='4'/>", "main.xml:1:1", "no <BehaviorTree>"),
         (b"<!DOCTYPE a [<!ENTITY b 'c'>]>\n<root BTCPP_format='4'>&b;</root>", "main.xml:1:1", "is not accepted"),
         (b"\xff\xfe\x00", "main.xml:1:", "not well-formed XML"),
-        (b"<root BTCPP_format='4'><BehaviorTree/></root>", "main.xml:1:24", "needs an ID of its own"),
+        (b"<root BTCPP_format='4'><BehaviorTree/></root>", "main.xml:1:24", "needs exactly 1 node, and has 0"),
+        (
+            b"<root BTCPP_format='4'><BehaviorTree><A/></BehaviorTree>\n<BehaviorTree><A/></BehaviorTree></root>",
+            "main.xml:2:1",
+            "needs an ID of its own",
+        ),
         (b"<root BTCPP_format='4'><include path='x'/></root>", "main.xml:1:39", "x' is not there"),
         (b"<root BTCPP_format='4'><includes path='x'/></root>", "main.xml:1:24", "did you mean 'include'?"),
     ],
@@ -129,6 +134,11 @@ def test_a_malformed_file_is_an_error_with_a_place(tmp_path: Path, text: bytes, 
     assert result.stderr.startswith(f"{tmp_path / place}")
     assert message in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_lone_tree_needs_no_id(tmp_path: Path) -> None:
+    result = compile_tree(tmp_path, b"<root BTCPP_format='4'><BehaviorTree><AlwaysSuccess/></BehaviorTree></root>")
+    assert result.exit_code == 0, result.output
 
 
 def test_a_missing_file_is_an_error(tmp_path: Path) -> None:

@@ -13,13 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canopy.cli import main
-from canopy.compiler.port_types import Options
+from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.table import make_table
 from canopy.compiler.tree_reader import read_tree
 from canopy.fmt.cli import format_bytes
 
 REPOSITORY = Path(__file__).parents[2]
 TREES = sorted([*REPOSITORY.glob("examples/**/*.xml"), *REPOSITORY.glob("tests/**/*.xml")])
+CANONICAL_TREES = [file for file in TREES if "courier" not in file.parts]  # the courier's are as an editor leaves them
 
 # As Groot2 saves: four blanks, unknown attributes, a comment, a palette with escaped types, CDATA added by hand.
 GROOT = """\
@@ -91,7 +92,7 @@ def test_a_file_of_an_editor() -> None:
     assert meaning(GROOT) == meaning(CANONICAL)
 
 
-@pytest.mark.parametrize("file", TREES, ids=[str(file.relative_to(REPOSITORY)) for file in TREES])
+@pytest.mark.parametrize("file", CANONICAL_TREES, ids=[str(file.relative_to(REPOSITORY)) for file in CANONICAL_TREES])
 def test_every_tree_of_this_repository_is_in_canonical_form(file: Path) -> None:
     assert CliRunner().invoke(main, ["fmt", "--check", str(file)]).output == ""
 
@@ -103,8 +104,8 @@ def test_it_stays_the_same_tree(tmp_path: Path, file: Path) -> None:
     ugly = folder / file.name
     ugly.write_text(file.read_text(encoding="utf-8").replace(">\n", ">").replace("    ", "\t"), encoding="utf-8")
     assert CliRunner().invoke(main, ["fmt", str(ugly)]).exit_code == 0
-    options = Options(include="state.h")  # trees may have ports of the user's own types
-    assert make_table(read_tree(ugly, options)).hash == make_table(read_tree(file, options)).hash
+    if "<BehaviorTree" in file.read_text(encoding="utf-8"):  # else it holds models only
+        assert make_table(read_tree(ugly, ANY_TYPE)).hash == make_table(read_tree(file, ANY_TYPE)).hash
     assert meaning(ugly.read_text(encoding="utf-8")) == meaning(file.read_text(encoding="utf-8"))
 
 

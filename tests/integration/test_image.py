@@ -94,6 +94,27 @@ def test_constants_are_the_bits_of_their_type(tmp_path: Path, firmware: Path) ->
     assert image.texts == "Ä".encode() + b"\0"
 
 
+def test_fixed_point_constants_and_texts_that_leaves_write(tmp_path: Path) -> None:
+    tree = tmp_path / "main.xml"
+    text = (
+        '<root BTCPP_format="4"><BehaviorTree ID="Main"><Sequence>'
+        '<Say limit="-1.25" word="{word}"/><Say limit="2" word="{word}"/><Hear word="{word}"/></Sequence>'
+        "</BehaviorTree>"
+        '<TreeNodesModel><Action ID="Say"><input_port name="limit" type="int16_t*0.01"/>'
+        '<output_port name="word" type="std::string"/><MetadataFields><Metadata kind="SyncAction" texts="yes;no"/>'
+        '</MetadataFields></Action><Condition ID="Hear"><input_port name="word" type="std::string"/></Condition>'
+        "</TreeNodesModel></root>"
+    )
+    tree.write_text(text)
+    model = compile_firmware(tree, EXCHANGE / "exchange.dbc", tmp_path / "f", "--image-nodes", 9)
+    assert run("image", "build", tree, "--for", model, "-o", tmp_path / "x.img").exit_code == 0
+    assert read_image(tmp_path / "x.img").values == ((1, 0x10000 - 125), (3, 0), (1, 200), (3, 0), (0, 0))
+    tree.write_text(text.replace("*0.01", "*0.25"))
+    result = run("image", "build", tree, "--for", model, "-o", tmp_path / "y.img")
+    assert result.exit_code == 2
+    assert "'Say' is declared differently" in result.stderr
+
+
 def test_floating_point_constants(tmp_path: Path) -> None:
     tree = tmp_path / "main.xml"
     tree.write_text(
@@ -278,7 +299,7 @@ def test_show(tmp_path: Path, firmware: Path) -> None:
 
 def test_a_tree_with_every_construct_ticks_the_same_from_an_image(tmp_path: Path) -> None:
     folder = tmp_path / "generated"
-    images = ("--include", LANGUAGE / "state.h", "--image-nodes", 61, "--image-uses", 2)
+    images = ("--include", LANGUAGE / "state.h", "--image-nodes", 100)
     model = compile_firmware(LANGUAGE / "main.xml", LANGUAGE / "language.dbc", folder, *images)
     result = run("image", "build", LANGUAGE / "main.xml", "--for", model, "-o", tmp_path / "language.img")
     assert result.exit_code == 0, result.output

@@ -69,7 +69,9 @@ def test_each_file_is_included_once_and_named_in_the_model(tmp_path: Path) -> No
     [
         ({"a.xml": INNER.format('<include path="main.xml"/>')}, "a.xml:1:", ["in a loop: main.xml -> a.xml -> main.xml"]),
         ({"a.xml": INNER.format('<include path="a.xml"/>')}, "a.xml:1:", ["in a loop"]),
-        ({"a.xml": INNER.format('<include ros_pkg="x" path="y"/>')}, "a.xml:1:", ["ros_pkg=…> is not supported"]),
+        ({"a.xml": INNER.format('<include ros_pkg="x" path="y"/>')}, "a.xml:1:",
+         ["<include ros_pkg='x'>: the folder of this package is not known", "--ros-package x=DIR"]),
+        ({"a.xml": INNER.format('<include pat="y"/>')}, "a.xml:1:", ["<include> has no attribute 'pat'", "did you mean 'path'?"]),
         ({"a.xml": INNER.format("<include/>")}, "a.xml:1:", ["needs the attribute path"]),
         ({"a.xml": INNER.format('<BehaviorTree ID="Main"><AlwaysSuccess/></BehaviorTree>')}, "main.xml:2:", ["not 'Main'", "the other one:"]),
         ({"a.xml": INNER.format('<TreeNodesModel><Action ID="Go"/></TreeNodesModel>')}, "main.xml:6:", ["'Go' is declared again"]),
@@ -81,6 +83,48 @@ def test_wrong_includes_are_named(tmp_path: Path, files: dict[str, str], place: 
     result = compile_files(tmp_path, {"main.xml": text, **files})
     assert result.exit_code == 2, result.output
     assert result.stderr.startswith(str(tmp_path / place)), result.stderr
+    for part in texts:
+        assert part in result.stderr
+
+
+def test_trees_of_a_ros_package_are_found_where_its_folder_is(tmp_path: Path) -> None:
+    text = tree('<SubTree ID="Inner"/>').replace(
+        "<BehaviorTree", '<include ros_pkg="lib" path="a/b.xml"/><BehaviorTree', 1
+    )
+    (tmp_path / "share").mkdir()
+    files = {
+        "main.xml": text,
+        "share/c.xml": INNER.format(""),
+        "share/a/b.xml": '<root BTCPP_format="4"><include path="../c.xml"/></root>',
+    }
+    result = compile_files(tmp_path, files, "--ros-package", f"lib={tmp_path / 'share'}")
+    assert result.exit_code == 0, result.output
+    misnamed = compile_files(tmp_path, files, "--ros-package", f"lip={tmp_path / 'share'}")
+    assert "did you mean 'lip'?" in misnamed.stderr
+    assert "'lib' is not NAME=DIR" in compile_files(tmp_path, files, "--ros-package", "lib").stderr
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "place", "texts"),
+    [
+        ("main_tree_to_execute", "main_tree_to_exec", "1:43", ["<root> has no attribute 'main_tree_to_exec'", "did you mean 'main_tree_to_execute'?"]),
+        ("<BehaviorTree ID", "<BehaviorTree Id='x' ID", "2:19", ["<BehaviorTree> has no attribute 'Id'", "known here: ID"]),
+        ('default="3"', 'defualt="3"', "9:94", ["<input_port> has no attribute 'defualt'", "did you mean 'default'?"]),
+        ('<Decorator ID="Guard"', '<Decorator ID="Guard" kind="x"', "17:29", ["<Decorator> has no attribute 'kind'"]),
+    ],
+)  # fmt: skip
+def test_attributes_that_nobody_knows_are_refused(
+    tmp_path: Path, right: str, wrong: str, place: str, texts: list[str]
+) -> None:
+    text = tree("<AlwaysSuccess/>")
+    kept = '<root xmlns:x="urn:x" x:y="1" project_name="Mine" ' + text.removeprefix("<root ").replace(
+        "<BehaviorTree", "<BehaviorTree _fullpath='a'", 1
+    )
+    assert compile_files(tmp_path, {"main.xml": kept}).exit_code == 0
+    assert right in text
+    result = compile_files(tmp_path, {"main.xml": text.replace(right, wrong, 1)})
+    assert result.exit_code == 2, result.output
+    assert f"main.xml:{place}: error:" in result.stderr, result.stderr
     for part in texts:
         assert part in result.stderr
 
@@ -99,6 +143,17 @@ SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
         ("<SubTree ID='Sub' _x='1'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:23", ["has no attribute '_x'"]),
         ("<Sequence><Find goal='{x}'/><Go speed='{x}'/></Sequence>", "", "3:40",
          ["port 'speed' of 'Go' is int32_t, but entry 'x' is int16_t", "the other end is port 'goal' of 'Find'", "3:23"]),
+        ("<Sequence><Measure level='{x}'/><Fine level='{x}'/></Sequence>", "", "3:46",
+         ["port 'level' of 'Fine' is int16_t in steps of 0.01, but entry 'x' is int16_t in steps of 0.1", "the other end is port 'level' of 'Measure'"]),
+        ("<Fine level='1.005'/>", "", "3:14", ["port 'level' of 'Fine': 1.005 lies between two steps of 0.01", "write 1 or 1.01"]),
+        ("<Fine level='327.68'/>", "", "3:14", ["327.68 is outside int16_t in steps of 0.01 [-327.68, 327.67]"]),
+        ("<Fine level='1e9999'/>", "", "3:14", ["'1e9999' is not a number"]),
+        ("<Fine level='1/2'/>", "", "3:14", ["'1/2' is not a number"]),
+        ("<Fine level='much'/>", "", "3:14", ["'much' is not a number (int16_t in steps of 0.01)"]),
+        ("<Tenth level='{Climate.Temperature}'/>", "", "3:15", ["a number in steps of 0.5 would lose precision as int16_t in steps of 0.3"]),
+        ("<Sequence><Measure level='{x}'/><Script code='x := 1.25'/></Sequence>", "", "3:52", ["1.25 is no multiple of the step", "int16_t in steps of 0.1 is wanted"]),
+        ("<Sequence><Measure level='{x}'/><Script code='x := 4000'/></Sequence>", "", "3:52", ["4000 is outside int16_t in steps of 0.1 [-3276.8, 3276.7]"]),
+        ("<Sequence><Measure level='{x}'/><Script code='y := x'/></Sequence>", "", "3:47", ["entry 'y' would hold fractions", "type=\"int32_t*0.01\"/>"]),
         ("<Go speed='{x}'/>", "", "3:12", ["nothing writes entry 'x'", "ports of the main tree"]),
         ("<Find goal='5'/>", "", "3:13", ["'5' is a literal", "give an entry: {name}"]),
         ("<Go speed='{a b}'/>", "", "3:12", ["'a b' is not the name of an entry"]),
@@ -112,7 +167,22 @@ SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
         ("<Guard><AlwaysSuccess/><AlwaysSuccess/></Guard>", "", "3:1", ["<Guard> needs exactly 1 child"]),
         ("<Control ID='Guard'><AlwaysSuccess/></Control>", "", "3:1", ["'Guard' is declared as Decorator"]),
         ("<Action/>", "", "3:1", ["<Action> needs the attribute ID"]),
-        ("<TestNode/>", "", "3:1", ["<TestNode> is not supported"]),
+        ("<ManualSelector><AlwaysSuccess/></ManualSelector>", "", "3:1", ["<ManualSelector> is not supported"]),
+        ("<TestNode return_status='RUNNING'/>", "", "3:26", ["would never be done", "<KeepRunningUntilFailure>"]),
+        ("<TestNode return_status='IDLE'/>", "", "3:26", ["return_status='IDLE' is no status"]),
+        ("<TestNode async_delay='-1'/>", "", "3:24", ["async_delay='-1' is no time in ms"]),
+        ("<TestNode script='x := 1'/>", "", "3:19", ["<TestNode> has no attribute 'script'"]),
+        ("<TestNode post_script='x := '/>", "", "3:29", ["a value is expected here"]),
+        ("<TestNode><AlwaysSuccess/></TestNode>", "", "3:1", ["<TestNode> needs exactly 0 child node(s)"]),
+        ("<TryCatch catch_on_halt='true'><AlwaysSuccess/><Sequence><Go speed='1'/></Sequence></TryCatch>", "", "3:48",
+         ["the last child of <TryCatch> must be a leaf", "do the clean-up in one leaf"]),
+        ("<TryCatch catch_on_halt='{n}'><AlwaysSuccess/><Go speed='1' _skipIf='true'/></TryCatch>", "", "3:47", ["must be a leaf of yours or a Script"]),
+        ("<TryCatch catch_on_halt='perhaps'><AlwaysSuccess/><Go speed='1'/></TryCatch>", "", "3:1", ["'perhaps' is not a whole number"]),
+        ("<Choose colour='{c}'/>", "", "13:21", ["port 'colour' of 'Choose': texts are constants, and nothing says which", '<Metadata texts="red;green"/>']),
+        ("<Sequence><Name it='{x}'/><LoopInt queue='{x}' value='{v}'><AlwaysSuccess/></LoopInt></Sequence>", "", "3:43",
+         ["entry 'x' is canopy_queue_text_3_t, and a queue of int32_t is needed"]),
+        ("<Sequence><Find goal='{q}'/><LoopString queue='{q}' value='{v}'><AlwaysSuccess/></LoopString></Sequence>", "", "3:48",
+         ["a queue of texts is needed", "type='std::string[8]'"]),
         ("<Repeat num_cycles='{n}'><AlwaysSuccess/></Repeat>", "", "3:21", ["nothing writes entry 'n'"]),
         ("<Switch2 variable='{x}' case_1='1'><AlwaysSuccess/></Switch2>", "", "3:1", ["needs the attribute case_2"]),
         ("<Switch2 variable='1' case_1='1' case_2='2'><AlwaysSuccess/></Switch2>", "", "3:1", ["needs exactly 3 child nodes"]),
@@ -151,6 +221,9 @@ def test_wrong_subtrees_and_ports_are_named(
         ("x += 1", 0, ["'+=' needs an entry that is there"]),
         ("y > 1", 0, ["nothing writes entry 'y'"]),
         ("total := 1; totl > 1", 12, ["nothing writes entry 'totl'", "did you mean 'total'?"]),
+        ("x := 1e9999", 5, ["a number that is too long"]),
+        ("x := " + "9" * 5000, 5, ["a number that is too long"]),
+        ("x := 1e400 / 3", 0, ["entry 'x' would hold fractions"]),
         ("x := 0.5", 0, ["entry 'x' would hold fractions", "--allow-floating-point"]),
         ("x := 1; y := 6 / x", 15, ["a division by what is no constant would be rounded"]),
         ("x := 1 / 0", 7, ["a division by 0"]),
@@ -192,6 +265,7 @@ def test_wrong_scripts_are_named_with_the_character(tmp_path: Path, script: str,
         ("a ? b : c ? d : e", "Conditional(Name,Name,Conditional(Name,Name,Name))"),
         ("x := a == b ? 1 : 2", "Assignment(:=,Conditional(Comparison(==),Number,Number))"),
         ("x += 0x1F", "Assignment(+=,Number)"),
+        ("x := 1.5e3", "Assignment(:=,Number)"),
         ("'a' .. 'b'", "Binary(..,Text,Text)"),
         ("@root == Battery.Level", "Comparison(==)"),
         (";; a ;", "Name"),

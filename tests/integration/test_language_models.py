@@ -44,7 +44,12 @@ def test_stubs_compile_and_are_never_overwritten(tmp_path: Path, compiler: str) 
         ("nav_msgs::msg::Path", "const path_t *"),
         ("std::vector&amp;lt;int&amp;gt;", "const list_t *"),
         ("double", "double"),
+        ("uint16", "uint16_t"),
+        ("float64", "double"),
         ("pose_t", "const pose_t *"),
+        ("int16_t*0.01", "int16_t"),
+        ("unsigned char / 4", "uint8_t"),
+        ("my::Celsius", "int32_t"),
     ],
 )
 def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
@@ -54,6 +59,8 @@ def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
         "nav_msgs::msg::Path=path_t",
         "--type-map",
         "std::vector<int>=list_t",
+        "--type-map",
+        "my::Celsius=int32_t * 0.1",
         "--include",
         "mine.h",
     ]
@@ -65,6 +72,18 @@ def test_types_of_models(tmp_path: Path, name: str, c_type: str) -> None:
     assert f"    {spaced}p;" in (tmp_path / "out" / "main_leaves.h").read_text()
 
 
+def test_a_port_in_both_directions_has_two_names(tmp_path: Path) -> None:
+    port = '<{}_port name="index" type="int"/>'
+    texts = []
+    for name in ("inout", "bidirectional"):
+        model = f'<Control ID="Resume">{port.format(name)}</Control>'
+        nodes = "<Sequence><Script code='i := 0'/><Resume index='{i}'><AlwaysSuccess/></Resume></Sequence>"
+        assert compile_files(tmp_path, {"main.xml": tree(nodes, model=model)}).exit_code == 0
+        texts.append((tmp_path / "out" / "main_leaves.h").read_text())
+    assert texts[0] == texts[1]
+    assert "int32_t *index;" in texts[0]
+
+
 def test_floating_point_only_where_it_is_allowed(tmp_path: Path) -> None:
     nodes = "<Sequence><Script code='x := 0.5; n := 3; y := x / n; z := y > 0.1'/><ScriptCondition code='x + n &gt;= 2'/></Sequence>"
     result = compile_files(tmp_path, {"main.xml": tree(nodes)}, "--allow-floating-point")
@@ -72,6 +91,35 @@ def test_floating_point_only_where_it_is_allowed(tmp_path: Path) -> None:
     text = (tmp_path / "out" / "main_app.c").read_text()
     assert "canopy_divide(app->entries.x, (double)app->entries.n" in text
     assert (tmp_path / "out" / "main_app.h").read_text().count("    double ") == 2
+
+
+FLOATING = ["--dbc", str(ROOT / "tests" / "unit" / "floating" / "floating.dbc")]
+
+
+@pytest.mark.parametrize(
+    ("nodes", "options", "texts"),
+    [
+        ("<ScriptCondition code='Level.Water &gt; 1'/>", [], ["'Level.Water' is floating point", "--allow-floating-point"]),
+        ("<Script code='Pump.Power := 1'/>", [], ["'Pump.Power' is floating point", "use a leaf"]),
+        ("<Go speed='{Level.Water}'/>", [], ["port 'speed' of 'Go': 'Level.Water' is floating point"]),
+        ("<Go speed='{Level.Water}'/>", ["--allow-floating-point"],
+         ["port 'speed' of 'Go': a floating-point signal would be cut to int32_t", "convert it in a script"]),
+    ],
+)  # fmt: skip
+def test_floating_point_signals_are_refused_by_name(
+    tmp_path: Path, nodes: str, options: list[str], texts: list[str]
+) -> None:
+    result = compile_files(tmp_path, {"main.xml": tree(nodes)}, *FLOATING, *options)
+    assert result.exit_code == 2, result.output
+    for text in texts:
+        assert text in result.stderr
+
+
+def test_a_constant_that_no_double_can_hold_is_refused(tmp_path: Path) -> None:
+    nodes = "<Script code='x := 0.5; y := x * 1e400'/>"
+    result = compile_files(tmp_path, {"main.xml": tree(nodes)}, "--allow-floating-point")
+    assert result.exit_code == 2
+    assert "a number that is too large for floating point" in result.stderr
 
 
 GROOT = """\
@@ -200,3 +248,19 @@ def test_every_construct_compiles_without_a_warning(tmp_path: Path, compiler: st
     include = ["-I", str(ROOT / "runtime" / "include"), "-I", str(tmp_path / "out")]
     source = str(tmp_path / "out" / "main_app.c")
     subprocess.run([compiler, "-std=c11", *WARNINGS, *include, "-c", source, "-o", "/dev/null"], check=True)
+
+
+def test_texts_of_a_leaf_need_names_of_their_own(tmp_path: Path) -> None:
+    for texts in ("low noise;low-noise", "red;?"):
+        model = f"<Action ID='A'><output_port name='p' type='std::string'/><MetadataFields><Metadata texts='{texts}'/></MetadataFields></Action>"
+        result = compile_files(tmp_path, {"main.xml": tree("<A p='{e}'/>", model=model)})
+        assert result.exit_code == 2
+        assert "gives no C name of its own" in result.stderr
+
+
+@pytest.mark.parametrize("item", ["std::chrono::milliseconds", "pose_t"])
+def test_queues_hold_numbers_and_texts(tmp_path: Path, item: str) -> None:
+    model = f"<Action ID='A'><output_port name='p' type='{item}[4]'/></Action>"
+    result = compile_files(tmp_path, {"main.xml": tree("<A p='{e}'/>", model=model)}, "--include", "mine.h")
+    assert result.exit_code == 2
+    assert "a queue has 1 to 65535 numbers or texts" in result.stderr

@@ -21,7 +21,7 @@ from canopy.cli import main
 from canopy.compiler.blackboard import Blackboard, Entry, Use
 from canopy.compiler.bus_reader import read_bus
 from canopy.compiler.errors import Place
-from canopy.compiler.port_types import PORT_TYPES
+from canopy.compiler.port_types import Options, read_type
 from canopy.compiler.script.compile import Compiler, Texts
 from canopy.compiler.script.syntax import ScriptError, parse
 
@@ -34,6 +34,9 @@ INPUTS = 40
 # Entries by name. Fractions are only made of the narrow ones, so that few expressions need more than 64 bits.
 ENTRIES = {"a": "int8_t", "b": "uint16_t", "c": "int32_t", "d": "uint32_t", "e": "int64_t", "f": "bool"}
 NARROW = ("a", "b", "c")
+FIXED = {"g": "int16_t*0.25", "h": "uint8_t/5", "k": "int32_t*2.5"}  # raw values, as in C
+KINDS = ENTRIES | FIXED
+STEPS = {"g": Fraction(1, 4), "h": Fraction(1, 5), "k": Fraction(5, 2)}
 SIGNAL = "Climate.Temperature"  # 16 bits, signed, 0.5 degC a bit, offset 10
 
 Values = dict[str, int]
@@ -63,6 +66,10 @@ class Sample:
 
 def _entry(name: str) -> Sample:
     return Sample(name, lambda values: Fraction(values[name]))
+
+
+def _fixed(name: str) -> Sample:
+    return Sample(name, lambda values: values[name] * STEPS[name])
 
 
 def _signal() -> Sample:
@@ -120,7 +127,8 @@ def _whole(rng: random.Random, depth: int) -> Sample:
 def _fraction(rng: random.Random, depth: int) -> Sample:
     """A number with a step of its own."""
     if depth == 0:
-        leaf = _signal() if rng.random() < 0.4 else _entry(rng.choice(NARROW))
+        leaf = _signal() if rng.random() < 0.3 else _entry(rng.choice(NARROW))
+        leaf = _fixed(rng.choice(list(FIXED))) if rng.random() < 0.4 else leaf
         return _math(leaf, rng.choice("+-*"), _constant(rng, whole=rng.random() < 0.2))
     if rng.random() < 0.2:
         inner = _fraction(rng, depth - 1)
@@ -164,12 +172,16 @@ def _truth(rng: random.Random, depth: int) -> Sample:
 
 def _compiler() -> Compiler:
     board = Blackboard()
-    for name, kind in ENTRIES.items():
+    for name, kind in KINDS.items():
         target = board.main.resolve(name, Place("x"))
         assert isinstance(target, Entry)
-        target.uses.append(Use(PORT_TYPES[kind], Place("x"), "test", True))
+        target.uses.append(Use(read_type(kind, "test", Place("x"), Options()), Place("x"), "test", True))
         target.settle_type()
     return Compiler(board.main, Place("x"), read_bus(DBC, "Controller", 10), Texts(), floats=False)
+
+
+# What random scripts have found.
+ONCE_WRONG = [Sample("((7 | a) > 255)", lambda values: Fraction((7 | values["a"]) > 255))]
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +190,7 @@ def samples() -> list[Sample]:
     print(f"seed {SEED} (set CANOPY_SEED to change it)")
     rng = random.Random(SEED)
     compiler = _compiler()
-    kept: list[Sample] = []
+    kept = list(ONCE_WRONG)
     refused = 0
     while len(kept) < SCRIPTS:
         sample = _whole(rng, 3) if rng.random() < 0.5 else _truth(rng, 3)
@@ -225,14 +237,15 @@ def _escape(text: str) -> str:
 def library(samples: list[Sample], tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = tmp_path_factory.mktemp("scripts")
     nodes = "".join(f'\n<Script code="{_escape(f"result := {sample.text}")}"/>' for sample in samples)
-    types = ENTRIES | {"result": "int64_t"}
+    types = KINDS | {"result": "int64_t"}
     ports = "".join(f'<input_port name="{name}" type="{kind}" default="0"/>' for name, kind in types.items())
     (folder / "scripts.xml").write_text(TREE.format(nodes=nodes, ports=ports))
     arguments = ["compile", str(folder / "scripts.xml"), "--dbc", str(DBC), "--node", "Controller", "--period-ms", "10"]
     result = CliRunner().invoke(main, [*arguments, "-o", str(folder)])
     assert result.exit_code == 0, result.output
     setters = "\n".join(
-        f"    scripts_entries->{name} = ({kind})values[{index}];" for index, (name, kind) in enumerate(ENTRIES.items())
+        f"    scripts_entries->{name} = ({kind.partition('*')[0].partition('/')[0]})values[{index}];"
+        for index, (name, kind) in enumerate(KINDS.items())
     )
     (folder / "harness.c").write_text(HARNESS.format(setters=setters))
     flags = [
@@ -258,8 +271,9 @@ def library(samples: list[Sample], tmp_path_factory: pytest.TempPathFactory) -> 
 
 def _random_inputs(rng: random.Random) -> Values:
     values = {}
-    for name, kind in ENTRIES.items():
-        low, high = PORT_TYPES[kind].low, PORT_TYPES[kind].high
+    for name, kind in KINDS.items():
+        port_type = read_type(kind, "test", Place("x"), Options())
+        low, high = port_type.low, port_type.high
         edges = [low, high, 0, min(1, high), (low + high) // 2]
         values[name] = rng.choice(edges) if rng.random() < 0.5 else rng.randint(low, high)
     values["raw"] = rng.choice([-32768, 32767, 0, 1, 20, rng.randint(-32768, 32767)])
@@ -270,7 +284,7 @@ def test_random_scripts_give_what_exact_arithmetic_gives(samples: list[Sample], 
     rng = random.Random(SEED + 1)
     for _ in range(INPUTS):
         values = _random_inputs(rng)
-        numbers = (ctypes.c_int64 * len(ENTRIES))(*(values[name] for name in ENTRIES))
+        numbers = (ctypes.c_int64 * len(KINDS))(*(values[name] for name in KINDS))
         library.set_inputs(numbers, ctypes.c_int16(values["raw"]))
         for index, sample in enumerate(samples):
             assert library.run(index) == _saturated(sample.meaning(values)), (sample.text, values)

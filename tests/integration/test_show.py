@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from canopy.cli import main
 from canopy.compiler.node_types import node_types
+from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
 from canopy.show.layout import Box, place
 from canopy.show.order import in_order
@@ -19,7 +20,7 @@ from canopy.show.symbols import look
 from canopy.show.terminal import lines
 
 REPOSITORY = Path(__file__).parents[2]
-TREES = sorted(REPOSITORY.glob("examples/**/*.xml"))
+TREES = sorted(file for file in REPOSITORY.glob("examples/**/*.xml") if "<BehaviorTree" in file.read_text())
 SVG = "{http://www.w3.org/2000/svg}"
 
 TREE = """\
@@ -63,6 +64,16 @@ def test_in_a_pipe_it_is_plain_text(file: Path) -> None:
     assert show(file) == TERMINAL
 
 
+def test_nodes_of_the_users_own_have_their_names_and_any_type(tmp_path: Path) -> None:
+    file = tmp_path / "own.xml"
+    file.write_text(
+        '<root BTCPP_format="4"><BehaviorTree ID="Main"><Recovery name="Plan"><Rate><Go path="{p}"/></Rate></Recovery>'
+        '</BehaviorTree><TreeNodesModel><Control ID="Recovery"/><Decorator ID="Rate"/>'
+        '<Action ID="Go"><output_port name="path" type="std::vector&lt;Pose&gt;"/></Action></TreeNodesModel></root>'
+    )
+    assert show(file) == "Main\nRecovery Plan\n└── δ Rate\n    └── [Go]\n"
+
+
 def test_ascii_where_nothing_else_can_be_encoded(file: Path) -> None:
     text = "\n".join(line.plain for line in lines(read_tree(file), ascii_only=True))
     assert text.isascii()
@@ -78,7 +89,7 @@ def test_on_a_terminal_it_has_colours(file: Path) -> None:
 def test_the_svg_has_every_node_once_and_none_overlap(tree: Path) -> None:
     root = ET.fromstring(show(tree, "--svg", "-"))
     nodes = root.findall(f"{SVG}g")[1:]
-    assert len(nodes) == len(list(in_order(read_tree(tree).root)))
+    assert len(nodes) == len(list(in_order(read_tree(tree, ANY_TYPE).root)))
     assert len(root.findall(f".//{SVG}path")) == len(nodes) - 1
     left, top, width, height = map(float, root.attrib["viewBox"].split())
     areas: list[tuple[float, float, float, float]] = []
@@ -152,3 +163,17 @@ def test_a_deep_tree_is_drawn(tmp_path: Path) -> None:
     file.write_text(f"<root BTCPP_format='4'><BehaviorTree ID='T'>{deep}</BehaviorTree></root>")
     assert show(file).count("\n") == 2_002
     assert show(file, "--svg", "-").count("<g>") == 2_001
+
+
+def test_a_tree_with_types_of_the_users_own() -> None:
+    language = REPOSITORY / "tests" / "unit" / "language" / "main.xml"
+    refused = CliRunner().invoke(main, ["show", str(language)])
+    assert refused.exit_code == 2
+    assert "name its header with --include" in refused.output
+    shown = show(language, "--include", "state.h")
+    assert "TryCatch [catch_on_halt]" in shown
+    assert "[TestNode return_status=3 async_delay=0 failure_script=stand_in = 2 post_script=posts += 1]" in shown
+    floating = REPOSITORY / "tests" / "unit" / "floating" / "main.xml"
+    assert "[Measure]" in show(floating, "--allow-floating-point")
+    wrong = CliRunner().invoke(main, ["show", str(language), "--type-map", "x"])
+    assert (wrong.exit_code, "'x' is not CXX=C" in wrong.output) == (2, True)

@@ -46,6 +46,7 @@ def random_tree(dice: random.Random, depth: int) -> str:
         )
     kind = dice.choice([kind for kind in built_in_types().values() if kind.most_children])
     count = dice.randint(kind.least_children, min(kind.most_children, 4))
+    children = [random_tree(dice, depth - 1) for _ in range(count)]
     attributes = ""
     for parameter in kind.parameters:
         value = {
@@ -53,12 +54,14 @@ def random_tree(dice: random.Random, depth: int) -> str:
             "failure_count": dice.randint(1, count),
             "max_failures": dice.choice([*range(1, count + 1), -1]),
             "then_skip": dice.choice(["true", "false"]),
+            "catch_on_halt": dice.choice(["true", "false"]),
         }.get(parameter.name, dice.randint(0, 3))
         if dice.random() < 0.2:
             value = "{n}"
+        if parameter.name == "catch_on_halt" and children[-1] not in [f"<{name}/>" for name in LEAVES]:
+            value = "false"
         attributes += f" {parameter.name}='{value}'"
-    children = "".join(random_tree(dice, depth - 1) for _ in range(count))
-    return f"<{kind.name}{attributes}>{children}</{kind.name}>"
+    return f"<{kind.name}{attributes}>{''.join(children)}</{kind.name}>"
 
 
 def test_every_node_type_has_its_rule() -> None:
@@ -130,6 +133,9 @@ def test_the_sets_are_sharp_where_rules_need_them(tmp_path: Path) -> None:
         "<Precondition if='n == 1' else='SKIPPED'><Yes/></Precondition>": "SKIPPED SUCCESS",
         "<Yes _skipIf='n == 1'/>": "SKIPPED SUCCESS",
         "<LoopInt queue='1;2' value='{n}' if_empty='FAILURE'><Yes/></LoopInt>": "FAILURE RUNNING",
+        "<TryCatch catch_on_halt='true'><Busy/><Yes/></TryCatch>": "RUNNING",
+        "<TestNode return_status='FAILURE'/>": "FAILURE",
+        "<TestNode async_delay='5'/>": "RUNNING SUCCESS",
         "<Switch2 variable='{n}' case_1='1' case_2='2'><Yes/><No/><Busy/></Switch2>": "FAILURE RUNNING SUCCESS",
     }
     for nodes, expected in cases.items():

@@ -277,6 +277,25 @@ static void try_catch_fails_after_its_handler(void)
     EXPECT("KKS", CANOPY_SKIPPED, "ab");
 }
 
+static void try_catch_may_tick_its_handler_when_it_is_halted(void)
+{
+    static const int32_t yes[] = {1};
+    static const canopy_node_t nodes[] = {INNER(REACTIVE_FALLBACK, 0, 5, 0, 0), CONDITION(0, 1, 0),
+                                          INNER(TRY_CATCH, 0, 5, 0, 0), ACTION(2, 3, 1), SYNC(2, 4, 2)};
+
+    START(nodes, yes);
+    EXPECT("FR", CANOPY_RUNNING, "ab");
+    EXPECT("SRS", CANOPY_SUCCESS, "ab!c");
+    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 4));
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 2));
+    EXPECT("SRS", CANOPY_SUCCESS, "a");
+    /* A SyncAction that is RUNNING counts as FAILURE, here too. */
+    EXPECT("FR", CANOPY_RUNNING, "ab");
+    EXPECT("SRR", CANOPY_SUCCESS, "ab!c");
+    TEST_ASSERT_EQUAL_UINT32(1, bench.instance.faults);
+    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_FAILURE, canopy_tree_status_code(&bench.instance, 4));
+}
+
 static void a_halt_goes_deepest_first_and_once(void)
 {
     /* ReactiveFallback(a, Sequence(b, Parallel(c, Inverter(d), e))): a aborts everything below the sequence. */
@@ -396,6 +415,7 @@ int main(void)
     RUN_TEST(while_do_else_asks_every_tick_and_halts_the_other_branch);
     RUN_TEST(the_else_branch_may_be_missing);
     RUN_TEST(try_catch_fails_after_its_handler);
+    RUN_TEST(try_catch_may_tick_its_handler_when_it_is_halted);
     RUN_TEST(a_halt_goes_deepest_first_and_once);
     RUN_TEST(halting_the_tree_follows_the_same_rule);
     RUN_TEST(statuses_are_kept_for_monitors);

@@ -125,6 +125,26 @@ static void signals_are_compared_in_physical_units(void)
     TEST_ASSERT_EQUAL_UINT16(100, language_output->fan.speed);
 }
 
+static void fixed_point_is_counted_in_steps(void)
+{
+    /* 10.5 degC: Scale sees its literal in quarters, the signal in tenths, and hands on the gain, -1.25 + 0.25. */
+    cycle_with(1, 2);
+    TEST_ASSERT_EQUAL_INT16(-100, language_entries->scaled);
+    TEST_ASSERT_EQUAL_INT16(-100, language_entries->scaled_copy);
+    TEST_ASSERT_EQUAL_INT8(-101, language_entries->trimmed);
+    TEST_ASSERT_EQUAL_INT16(50, language_entries->gain);
+    TEST_ASSERT_EQUAL_INT32(50, language_entries->whole);
+    TEST_ASSERT_EQUAL_UINT16(50, language_output->fan.ticks);
+    TEST_ASSERT_EQUAL_UINT32(0, language_entries->script_faults);
+    /* What does not fit is limited, and counted: 10 * 327.67 - 0.1 in steps of 0.1 is above 12.7. */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    language_entries->gain = INT16_MAX;
+    cycle();
+    TEST_ASSERT_EQUAL_INT16(INT16_MAX, language_entries->gain);
+    TEST_ASSERT_EQUAL_INT8(INT8_MAX, language_entries->trimmed);
+    TEST_ASSERT_EQUAL_UINT32(2, language_entries->script_faults);
+}
+
 static void scripts_that_read_stale_signals_are_false(void)
 {
     cycle();
@@ -150,6 +170,20 @@ static void texts_are_places_in_a_table(void)
 {
     cycle_with(0, 0);
     TEST_ASSERT_EQUAL_STRING("green", language_texts[language_entries->text]);
+}
+
+static void leaves_write_texts_and_queues_of_texts(void)
+{
+    static const char *const said[] = {"light green", "red"};
+
+    cycle();
+    TEST_ASSERT_EQUAL_STRING("light green", language_texts[language_entries->colour]);
+    TEST_ASSERT_EQUAL_STRING("red", language_texts[language_entries->text_before]);
+    for (unsigned tick = 0; tick < 2u; tick++) {
+        TEST_ASSERT_EQUAL_STRING(said[tick], language_texts[language_entries->next_colour]);
+        TEST_ASSERT_EQUAL_UINT16(1u - tick, language_entries->colours.count);
+        cycle();
+    }
 }
 
 static void a_loop_takes_one_item_a_tick(void)
@@ -191,6 +225,24 @@ static void updates_are_counted_where_a_node_waits_for_them(void)
     TEST_ASSERT_EQUAL_INT32(1, language_entries->seen);
 }
 
+static void test_nodes_stand_in_for_leaves(void)
+{
+    cycle();
+    cycle();
+    TEST_ASSERT_EQUAL_INT32(0, language_entries->stand_in);
+    cycle(); /* 20 ms after the first */
+    TEST_ASSERT_EQUAL_INT32(2, language_entries->stand_in);
+    TEST_ASSERT_EQUAL_INT32(11, language_entries->posts);
+}
+
+static void a_script_cleans_up_after_a_try_that_is_halted(void)
+{
+    cycle(); /* the loop's first item, and Sleep starts */
+    TEST_ASSERT_FALSE(language_entries->cleaned_up);
+    cycle(); /* the second one makes the condition true: Sleep is halted */
+    TEST_ASSERT_TRUE(language_entries->cleaned_up);
+}
+
 static void control_nodes_and_decorators_of_the_users_own(void)
 {
     language_entries->mode = 2;
@@ -220,12 +272,16 @@ int main(void)
     RUN_TEST(the_programs_own_entries_begin_with_their_defaults);
     RUN_TEST(parameters_of_built_in_nodes_may_be_entries);
     RUN_TEST(signals_are_compared_in_physical_units);
+    RUN_TEST(fixed_point_is_counted_in_steps);
     RUN_TEST(scripts_that_read_stale_signals_are_false);
     RUN_TEST(a_switch_takes_the_case_that_matches);
     RUN_TEST(texts_are_places_in_a_table);
+    RUN_TEST(leaves_write_texts_and_queues_of_texts);
     RUN_TEST(a_loop_takes_one_item_a_tick);
     RUN_TEST(a_loop_takes_the_items_of_an_entry);
     RUN_TEST(updates_are_counted_where_a_node_waits_for_them);
+    RUN_TEST(test_nodes_stand_in_for_leaves);
+    RUN_TEST(a_script_cleans_up_after_a_try_that_is_halted);
     RUN_TEST(control_nodes_and_decorators_of_the_users_own);
     RUN_TEST(nothing_was_limited);
     return UNITY_END();

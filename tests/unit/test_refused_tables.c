@@ -167,6 +167,29 @@ static void parameters_that_mean_nothing_are_refused(void)
                  tables.nodes[13].state = 2, tables.nodes[13].parameter = 1));
 }
 
+/** A TryCatch of three: an action, a Sequence, and what is ticked when it is halted. */
+static void a_handler_that_a_halt_cannot_tick_is_refused(void)
+{
+    static const int32_t parameters[] = {1, 0};
+    canopy_node_t nodes[] = {INNER(TRY_CATCH, 0, 5, 0, 0), ACTION(0, 1, 0), INNER(SEQUENCE, 0, 4, 1, 0),
+                             ACTION(2, 3, 0), ACTION(0, 4, 0)};
+
+    nodes[1].leaf = 1;
+    nodes[3].leaf = 1;
+    nodes[4].leaf = 1;
+    tables.tree.nodes = nodes;
+    tables.tree.node_count = 5;
+    tables.tree.parameters = parameters;
+    tables.tree.parameter_count = 2;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tables.tree, NULL));
+    nodes[4].type = CANOPY_NODE_ALWAYS_SUCCESS;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&tables.tree, NULL));
+    nodes[0].parameter = 1; /* not ticked when it is halted */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tables.tree, NULL));
+    nodes[0].asks = 1; /* a script may say so */
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&tables.tree, NULL));
+}
+
 static void state_words_that_are_missing_or_shared_are_refused(void)
 {
     REFUSED(0, tables.nodes[0].state = TABLE_WORDS);
@@ -256,8 +279,8 @@ static void ticks_to_a_fault(uint8_t type)
 static void a_leaf_that_has_children_is_a_fault(void)
 {
     static const uint8_t types[] = {
-        CANOPY_NODE_CONDITION,      CANOPY_NODE_SYNC_ACTION, CANOPY_NODE_STATEFUL_ACTION,  CANOPY_NODE_ALWAYS_SUCCESS,
-        CANOPY_NODE_ALWAYS_FAILURE, CANOPY_NODE_SLEEP,       CANOPY_NODE_WAS_ENTRY_UPDATED};
+        CANOPY_NODE_CONDITION,      CANOPY_NODE_SYNC_ACTION, CANOPY_NODE_STATEFUL_ACTION,   CANOPY_NODE_ALWAYS_SUCCESS,
+        CANOPY_NODE_ALWAYS_FAILURE, CANOPY_NODE_SLEEP,       CANOPY_NODE_WAS_ENTRY_UPDATED, CANOPY_NODE_TEST_NODE};
 
     for (unsigned type = 0; type < sizeof types; type++) {
         ticks_to_a_fault(types[type]);
@@ -268,11 +291,13 @@ static void a_leaf_that_has_children_is_a_fault(void)
 static void every_type_can_be_halted(void)
 {
     static const canopy_control_t control = {.enter = first_child, .child = as_child};
-    static const int32_t parameters[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
+    static const int32_t parameters[9] = {-1, -1, -1, -1, -1, -1, -1, -1, 0};
     script_t log = {.log = ""};
 
     for (unsigned type = 0; type <= UINT8_MAX; type++) {
-        canopy_node_t nodes[] = {{.type = (uint8_t)type, .end = 1}};
+        /* No script of an Attributes node; no handler of a TryCatch. */
+        uint16_t parameter = type == CANOPY_NODE_TRY_CATCH ? 8u : 0u;
+        canopy_node_t nodes[] = {{.type = (uint8_t)type, .end = 1, .parameter = parameter}};
         canopy_tree_t tree = {.nodes = nodes,
                               .leaves = &script_leaf,
                               .controls = &control,
@@ -298,6 +323,7 @@ int main(void)
     RUN_TEST(parameters_that_scripts_give_are_looked_at);
     RUN_TEST(functions_that_are_missing_are_refused);
     RUN_TEST(parameters_that_mean_nothing_are_refused);
+    RUN_TEST(a_handler_that_a_halt_cannot_tick_is_refused);
     RUN_TEST(state_words_that_are_missing_or_shared_are_refused);
     RUN_TEST(what_is_no_tree_is_refused);
     RUN_TEST(tables_that_are_not_needed_may_be_missing);

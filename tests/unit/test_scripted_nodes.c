@@ -206,6 +206,28 @@ static void was_entry_updated_is_a_leaf(void)
     EXPECT("", CANOPY_FAILURE, "F");
 }
 
+static void a_test_node_waits_then_runs_its_scripts(void)
+{
+    static const canopy_node_t nodes[] = {INNER(TEST_NODE, 0, 1, 0, 0)};
+    static const int32_t succeeds[] = {CANOPY_SUCCESS, 2, 0, 1, 2};
+    static const int32_t fails[] = {CANOPY_FAILURE, 0, 0, 1, 2};
+    static const int32_t is_skipped[] = {CANOPY_SKIPPED, 0, 0, 1, -1};
+
+    start(nodes, 1, succeeds, 5);
+    EXPECT_AT(1000, "", CANOPY_RUNNING, "");
+    EXPECT_AT(2999, "", CANOPY_RUNNING, "");
+    EXPECT_AT(3000, "", CANOPY_SUCCESS, "AC");
+    /* A halt stops the clock. */
+    EXPECT_AT(4000, "", CANOPY_RUNNING, "");
+    canopy_tree_halt(&bench.instance);
+    EXPECT_AT(6000, "", CANOPY_RUNNING, "");
+    EXPECT_AT(8000, "", CANOPY_SUCCESS, "AC");
+    start(nodes, 1, fails, 5);
+    EXPECT("", CANOPY_FAILURE, "BC");
+    start(nodes, 1, is_skipped, 5);
+    EXPECT("", CANOPY_SKIPPED, "");
+}
+
 static void loop_takes_one_item_a_tick(void)
 {
     static const int32_t parameters[] = {0, CANOPY_SUCCESS};
@@ -316,6 +338,8 @@ static void the_validator_refuses_scripts_and_statuses_that_are_none(void)
     static const int32_t last_below[] = {0, 0, 0, 0, 0, 0, 0, -2};
     static const int32_t idle[] = {0, CANOPY_IDLE, 0, 0, 0, 0, 0, 0};
     static const int32_t no_status[] = {0, 5, 0, 0, 0, 0, 0, 0};
+    static const int32_t test_of_none[] = {CANOPY_SUCCESS, 0, 0, 0, 8, 0, 0, 0};
+    static const canopy_node_t test_node[] = {INNER(TEST_NODE, 0, 1, 0, 0)};
 
     start_decorator(CANOPY_NODE_ATTRIBUTES, all_scripts, 8);
     refuses(beyond, CANOPY_NODE_ATTRIBUTES);
@@ -326,6 +350,12 @@ static void the_validator_refuses_scripts_and_statuses_that_are_none(void)
     refuses(no_status, CANOPY_NODE_LOOP);
     refuses(below, CANOPY_NODE_SKIP_UNLESS_UPDATED);
     refuses(beyond, CANOPY_NODE_WAIT_VALUE_UPDATE);
+    bench.tree.nodes = test_node;
+    bench.tree.node_count = 1;
+    bench.tree.parameters = idle;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
+    bench.tree.parameters = test_of_none;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
     bench.tree.control_count = 0;
     refuses(all_scripts, CANOPY_NODE_USER_DECORATOR);
 }
@@ -339,6 +369,7 @@ int main(void)
     RUN_TEST(precondition_asks_while_its_child_is_not_running);
     RUN_TEST(entries_are_new_once);
     RUN_TEST(was_entry_updated_is_a_leaf);
+    RUN_TEST(a_test_node_waits_then_runs_its_scripts);
     RUN_TEST(loop_takes_one_item_a_tick);
     RUN_TEST(switch_ticks_the_matching_case_and_halts_the_old_one);
     RUN_TEST(a_control_node_of_the_users_own);

@@ -62,6 +62,7 @@ def command(
     include: str | None,
     floats: bool,
     type_map: tuple[str, ...],
+    packages: tuple[str, ...],
     severity: str,
     disable: tuple[str, ...],
     strict: bool,
@@ -88,7 +89,7 @@ def command(
     rules = _wanted(disable, Severity[severity.upper()])
     bus = BusOptions(dbc, node, period_ms) if dbc is not None and node is not None else None
     try:
-        types = read_type_options(include, floats, type_map)
+        types = read_type_options(include, floats, type_map, packages)
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)

@@ -117,7 +117,7 @@ def through_decorators(node: Node) -> Node:
 
 def label(node: Node) -> str:
     """How messages name a node: its type, and its name when that says more."""
-    kind = node.leaf.id if node.leaf is not None else node.type.name
+    kind = node.xml_name or node.type.name
     return f"<{kind}>" if node.name == kind else f"<{kind}> '{node.name}'"
 
 

@@ -9,7 +9,7 @@ A node allows a rule with a marker in its `_description`, which editors show and
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,11 +19,12 @@ from canopy.check.rules.declarations import writing_conditions
 from canopy.compiler.emit import load_application
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.port_types import Options
-from canopy.compiler.tree_reader import Tree, read_tree
+from canopy.compiler.tree_reader import Tree, read_tree, read_unused_trees
 from canopy.compiler.xml_reader import Element
 
 _ALLOW = re.compile(r"canopy:allow\s+([\w-]+(?:\s*,\s*[\w-]+)*)")
 _BITRATE = 500_000
+OF_THE_WHOLE = ("root-can-fail", "condition-writes", "unused-port", "unused-tree")
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,19 @@ def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Fin
     return [_finding(rule, hit) for hit in hits] if rule in rules else []
 
 
+def _unused(tree: Tree, types: Options, rules: list[Rule]) -> Iterator[tuple[Rule, Hit]]:
+    """What `rules` find in the file's trees that are no part of its main tree; or why one would not compile."""
+    for tree_id, found in read_unused_trees(tree.path, types, tree):
+        if isinstance(found, CompileError):
+            why = f"tree '{tree_id}' is not used, and would not compile: {found.message}"
+            yield all_rules()["unused-tree"], Hit(found.place, why, found.help_text)
+            continue
+        facts = Facts(found)
+        for rule in rules:
+            if rule.id not in OF_THE_WHOLE:
+                yield from ((rule, hit) for hit in rule.run(facts))
+
+
 def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, types: Options | None = None) -> Report:
     """Asks `rules` about the tree in a file; findings in the order of the file. `types`: as for the compiler.
 
@@ -102,18 +116,23 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
     """
     wanted = list(rules)
     report = Report()
+    types = types or Options()
     try:
-        facts = Facts(_load(path, bus, types or Options()))
+        facts = Facts(_load(path, bus, types))
     except CompileError as error:
         report.findings = _refused(path, wanted, error)
         return report
     files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
     allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
-    for rule in wanted:
-        for hit in rule.run(facts):
-            if rule.id in allowed.get(hit.place, ()):
-                report.allowed += 1
-            else:
-                report.findings.append(_finding(rule, hit))
+    hits = [(rule, hit) for rule in wanted for hit in rule.run(facts)]
+    if any(rule.id == "unused-tree" for rule in wanted):
+        hits += _unused(facts.tree, types, wanted)
+    seen: set[tuple[str, Place, str]] = set()  # a tree that is part of two others is seen twice
+    for rule, hit in hits:
+        if rule.id in allowed.get(hit.place, ()):
+            report.allowed += 1
+        elif (rule.id, hit.place, hit.message) not in seen:
+            report.findings.append(_finding(rule, hit))
+            seen.add((rule.id, hit.place, hit.message))
     report.findings.sort(key=lambda f: (f.place.file, f.place.line, f.place.column, -f.rule.severity, f.rule.id))
     return report

@@ -30,6 +30,7 @@ LEAVES: dict[str, Statuses] = {
     "AlwaysFailure": frozenset((F,)),
     "Sleep": frozenset((S, R)),
     "WasEntryUpdated": frozenset((S, F)),
+    "TestNode": frozenset((S, F, R, K)),
 }
 
 
@@ -182,14 +183,15 @@ def _if_then_else(_node: Node, children: Sequence[Statuses]) -> Outcome:
     return Outcome(frozenset(result), (True, S in asked, F in asked)[: len(children)])
 
 
-def _try_catch(_node: Node, children: Sequence[Statuses]) -> Outcome:
+def _try_catch(node: Node, children: Sequence[Statuses]) -> Outcome:
     tried = _in_order(children[:-1], S, F)
     result = set(tried.statuses - {F})
     if F in tried.statuses:
         result |= children[-1] & {R}
         if children[-1] & {S, F, K}:
             result.add(F)
-    return Outcome(frozenset(result), (*tried.ticked, F in tried.statuses))
+    on_halt = node.parameters[0] != 0 and R in tried.statuses
+    return Outcome(frozenset(result), (*tried.ticked, F in tried.statuses or on_halt))
 
 
 def _map(**changed: str) -> Rule:
@@ -304,6 +306,9 @@ RULES: dict[str, Rule] = {
 
 def leaf_statuses(node: Node) -> Statuses:
     """What a leaf can return: what it declares, else what its kind allows; and its answer to stale signals."""
+    if node.type.name == "TestNode":
+        status, delay = node.parameters[:2]
+        return _given(status) | ({R} if delay else NONE)
     declared = node.leaf.returns if node.leaf is not None else ()
     result = frozenset(declared) or LEAVES.get(node.type.name, ANY)
     if node.leaf is not None and node.leaf.reads:

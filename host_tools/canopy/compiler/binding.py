@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 from canopy.compiler.blackboard import Entry, SignalName, Use
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.leaf_c import writes_texts
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.port_types import ANY, BOOL, DOUBLE, INT32, INT64, TEXT, Options, PortType, literal
-from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess, stripped
+from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess
+from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, Name, Number, ScriptError, parse, parts
 from canopy.compiler.script.values import Const, Double, Num, TextConst, Value
 from canopy.compiler.script_bodies import Bodies, entry_value
@@ -83,6 +85,10 @@ class _Binder:
                 script.body = bodies.body(script, self._parsed.get(id(script), ()))
             except ScriptError as error:
                 raise script_error(script, error) from error
+        for node in self._nodes:
+            if node.leaf is not None and writes_texts(node.leaf):
+                for text in node.leaf.texts:
+                    self._texts.index(text)
         bindings = Bindings(leaves=leaves)
         for node in self._nodes:
             if node.leaf is not None and node.bound:
@@ -165,7 +171,7 @@ class _Binder:
         value: Value
         if isinstance(source, SignalName):
             value = self._compiler(script).signal(source.text, 0)
-            return self._kind_of(value, [value.wide], script.place(), entry)
+            return self._kind_of(value, [isinstance(value, Num) and value.wide], script.place(), entry)
         value = guess(source.initial or "" if isinstance(source, Entry) else source)
         return self._kind_of(value, [], script.place(), entry)
 
@@ -199,7 +205,8 @@ class _Binder:
             raise CompileError(
                 place,
                 f"entry '{entry.name}' would hold fractions, and no port says its type",
-                "count in a smaller unit (whole numbers), or compile with --allow-floating-point",
+                f'declare it in fixed point, as a port of its tree: <inout_port name="{entry.name}" '
+                'type="int32_t*0.01"/>; or count in a smaller unit; or compile with --allow-floating-point',
             )
         return TEXT
 
@@ -281,24 +288,31 @@ class _Binder:
         where = f"port '{port.name}' of '{node.leaf.id}'"
         if port.type.kind == "any":
             raise CompileError(bound.place, f"{where}: nothing gives it a type", f"declare it, at {port.place}")
-        if port.writes and port.type.kind == "text":
+        if port.writes and port.type.holds_texts and not node.leaf.texts:
             raise CompileError(
                 port.place,
-                f"{where}: texts are constants, and cannot be written",
-                "use an enum of yours, or a whole number",
+                f"{where}: texts are constants, and nothing says which ones it may write",
+                f"list them in the model of '{node.leaf.id}': <Metadata texts=\"red;green\"/>",
             )
         if isinstance(bound.target, Entry):
             return self._connected(node.leaf, bound, bound.target, where, bindings)
         if isinstance(bound.target, SignalName):
-            compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
-            try:
-                c = compiler.convert(compiler.signal(bound.target.text, 0), port.type, 0)
-            except ScriptError as error:
-                raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
-            return BoundPort(_zero(port.type), stripped(c))
+            return self._signal(bound, bound.target, where)
         if bound.text is None:
             return BoundPort("NULL")
         return BoundPort(_constant(bound.text, port.type, where, bound.place))
+
+    def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
+        kind = bound.port.type
+        compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
+        try:
+            value = compiler.signal(target.text, 0)
+            if isinstance(value, Double) and kind.kind != "float":
+                raise ScriptError(0, f"a floating-point signal would be cut to {kind}", "convert it in a script")
+            c = compiler.storing.convert(value, kind, 0)
+        except ScriptError as error:
+            raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
+        return BoundPort(_zero(kind), stripped(c))
 
     def _connected(self, leaf: Leaf, bound: Bound, entry: Entry, where: str, bindings: Bindings) -> BoundPort:
         port = bound.port

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 from canopy.compiler.bus_reader import Bus, Message
-from canopy.compiler.leaf_c import entry_type
+from canopy.compiler.leaf_c import entry_type, item_type
 from canopy.compiler.leaf_model import Port
 from canopy.compiler.table import Table
 
@@ -112,7 +112,7 @@ def _entries(table: Table) -> tuple[int, int]:
     members = []
     for entry in table.bindings.entries:
         if entry.type.capacity:
-            members.append(struct_size([scalar("uint16_t"), array(scalar(entry.type.item), entry.type.capacity)]))
+            members.append(struct_size([scalar("uint16_t"), array(scalar(item_type(entry.type)), entry.type.capacity)]))
         elif entry.type.kind != "user":
             members.append(scalar(entry_type(entry)))
         if entry.counted:

@@ -8,6 +8,8 @@ of signals.
 from __future__ import annotations
 
 import dataclasses
+import logging
+import re
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -301,9 +303,18 @@ def _with_good_safe_values(message: Message) -> Message:
     return dataclasses.replace(message, signals=signals)
 
 
+MAX_BYTES = 16 * 1024 * 1024
+MAX_MESSAGE_BYTES = 1785  # of J1939's transport protocol
+_MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:\s*(\d+)")
+
+
 def _load(path: Path) -> Any:
     place = Place(str(path))
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise CompileError(place, f"the file has {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
+        _check_lengths(path)
+        logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
         database = cantools.database.load_file(str(path), database_format="dbc", strict=True)
     except OSError as error:
         raise CompileError(place, f"cannot be read: {error.strerror}") from error
@@ -311,7 +322,34 @@ def _load(path: Path) -> Any:
         raise CompileError(place, f"not a DBC that can be read: {error}") from error
     if not isinstance(database, cantools.database.can.Database):
         raise CompileError(place, "not a CAN database")
+    _check_unique(place, database)
     return database
+
+
+def _check_lengths(path: Path) -> None:
+    """Refuses messages longer than any protocol's: cantools takes memory and time for each bit of them."""
+    for number, line in enumerate(path.read_text(encoding="cp1252", errors="replace").splitlines(), 1):
+        found = _MESSAGE_LENGTH.match(line)
+        if found is not None and (len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES):
+            raise CompileError(
+                Place(str(path), number),
+                f"message '{found[1]}' is longer than {MAX_MESSAGE_BYTES} bytes",
+                "CAN FD has 64",
+            )
+
+
+def _check_unique(place: Place, database: Any) -> None:
+    names: set[str] = set()
+    identifiers: dict[tuple[int, bool], str] = {}
+    for message in database.messages:
+        if message.name in names:
+            raise CompileError(place, f"there are two messages '{message.name}'")
+        names.add(message.name)
+        other = identifiers.setdefault((message.frame_id, message.is_extended_frame), message.name)
+        if other != message.name:
+            raise CompileError(
+                place, f"messages '{other}' and '{message.name}' have the same id 0x{message.frame_id:X}"
+            )
 
 
 def _by_id(database: Any) -> list[Any]:

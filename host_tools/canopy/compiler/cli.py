@@ -16,7 +16,7 @@ from canopy.compiler.emit import load_application, render, write_files
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, MAX_NODES, MAX_USES
 from canopy.compiler.names import is_c_identifier
-from canopy.compiler.port_types import Options
+from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs, write_stubs
 
 INPUT_ERROR = 2
@@ -35,9 +35,16 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
 
 
+def _not_written(error: OSError, output: Path) -> CompileError:
+    return CompileError(Place(str(error.filename or output)), f"cannot be written: {error.strerror}")
+
+
 def type_options(command: _Command) -> _Command:
-    """The options about types, of every command that reads trees."""
+    """The options about types and includes, of every command that reads trees."""
     for option in (
+        click.option(
+            "--ros-package", "packages", multiple=True, metavar="NAME=DIR", help="Folder of an <include ros_pkg>."
+        ),
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
             "--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double."
@@ -50,19 +57,27 @@ def type_options(command: _Command) -> _Command:
     return command
 
 
-def read_type_options(include: str | None, floats: bool, type_map: tuple[str, ...]) -> Options:
+def read_type_options(
+    include: str | None, floats: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
+) -> Options:
     """What `type_options` were given.
 
     Raises:
-        CompileError: a --type-map is malformed.
+        CompileError: a --type-map or --ros-package is malformed.
     """
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not is_c_identifier(c_type.strip()):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
-    return Options(floats, result, include)
+    folders = {}
+    for pair in packages:
+        name, found, folder = pair.partition("=")
+        if not found or not name or not folder:
+            raise CompileError(Place("--ros-package"), f"'{pair}' is not NAME=DIR", "for example my_trees=src/my_trees")
+        folders[name] = Path(folder)
+    return Options(floats, result, include, folders)
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
@@ -97,6 +112,7 @@ def command(
     include: str | None,
     floats: bool,
     type_map: tuple[str, ...],
+    packages: tuple[str, ...],
     stubs_file: Path | None,
     depfile: Path | None,
     image_nodes: int | None,
@@ -117,7 +133,7 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        options = read_type_options(include, floats, type_map)
+        options = read_type_options(include, floats, type_map, packages)
         images = _images(image_nodes, image_uses)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)
@@ -129,18 +145,20 @@ def command(
         if most is not None and used > most:
             click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
+    made: list[Path] = []  # goes again when not all can be written
     try:
         if stubs_file is not None:
             write_stubs(stubs_file, stubs(application.name, application.table, application.bus))
+            made.append(stubs_file)
         write_files(output, files)
+        made += [output / file for file in files]
         if depfile is not None:
             read = [str(file.resolve()) for file in (*application.table.tree.files, dbc)]
             depfile.write_text(f"{output / application.name}_app.c: {' '.join(read)}\n".replace("\\", "/"))
-    except CompileError as error:
-        click.echo(str(error), err=True)
-        sys.exit(INPUT_ERROR)
-    except OSError as error:
-        click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
+    except (CompileError, OSError) as error:
+        for path in made:
+            path.unlink(missing_ok=True)
+        click.echo(str(error if isinstance(error, CompileError) else _not_written(error, output)), err=True)
         sys.exit(INPUT_ERROR)
     if as_json:
         click.echo(json.dumps(budget.as_dict()))

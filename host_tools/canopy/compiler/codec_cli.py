@@ -12,6 +12,7 @@ from canopy.compiler.bus_model import Bus
 from canopy.compiler.bus_reader import read_bus, read_messages
 from canopy.compiler.emit import environment, render_bus, write_files
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.layout import layout
 
 INPUT_ERROR = 2
 
@@ -20,7 +21,7 @@ def render_codec(bus: Bus) -> dict[str, str]:
     """The codec's two files: file name -> content. The same input gives the same bytes."""
     templates = environment(bus)
     return {
-        f"{bus.name}_codec.{suffix}": templates.get_template(f"codec.{suffix}.j2").render(bus=bus)
+        f"{bus.name}_codec.{suffix}": layout(templates.get_template(f"codec.{suffix}.j2").render(bus=bus))
         for suffix in ("h", "c")
     }
 

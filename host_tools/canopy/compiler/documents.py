@@ -11,6 +11,7 @@ from canopy.compiler.leaf_model import Declarations, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, read_xml
 
+UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
 
 
@@ -22,6 +23,13 @@ class Documents:
     trees: dict[str, Element] = field(default_factory=dict)
     main: str = ""
     declarations: Declarations = field(default_factory=Declarations)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that no file can have
+        return False
 
 
 class _Reader:
@@ -40,45 +48,61 @@ class _Reader:
             if element is None:
                 waiting.pop()
             elif element.tag == "include":
-                target = self._included(element, file)
+                path = self._included(element, file)
+                target = path.resolve()
                 chain = [open_file for _, _, open_file in waiting]
                 if target in [open_file.resolve() for open_file in chain]:
                     names = " -> ".join([*(open_file.name for open_file in chain), target.name])
                     raise CompileError(element.place, f"files include each other in a loop: {names}")
                 if target not in [known.resolve() for known in self.documents.files]:
-                    inner = self._read_root(file.parent / element.attributes["path"], element)
-                    waiting.append((inner, iter(inner.children), file.parent / element.attributes["path"]))
+                    inner = self._read_root(path, element)
+                    waiting.append((inner, iter(inner.children), path))
             else:
                 self._take(element)
         return top
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
-        if included_by is not None and not path.is_file():
+        if included_by is not None and not _is_file(path):
             place = included_by.attribute_place("path")
             raise CompileError(place, f"the included file '{path}' is not there", "paths are relative to this file")
         self.documents.files.append(path)
         root = read_xml(path)
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
-            raise CompileError(root.place, 'the outer element must be <root BTCPP_format="4">')
+            raise CompileError(
+                root.place,
+                'the outer element must be <root BTCPP_format="4">',
+                "a file without it may be one of BehaviorTree.CPP 3, which Groot2 converts",
+            )
+        root.only("BTCPP_format", "main_tree_to_execute", "project_name")
         return root
 
     def _included(self, element: Element, file: Path) -> Path:
-        for attribute in element.attributes:
-            if attribute == "ros_pkg":
-                raise CompileError(
-                    element.place, "<include ros_pkg=…> is not supported", "give the file's path, relative to this file"
-                )
-            if attribute != "path":
-                raise CompileError(element.place, f"<include> has no attribute '{attribute}'", "did you mean 'path'?")
+        element.only("path", "ros_pkg")
         if not element.attributes.get("path"):
             raise CompileError(element.place, "<include> needs the attribute path", 'for example path="other.xml"')
-        return (file.parent / element.attributes["path"]).resolve()
+        return self._folder(element, file) / element.attributes["path"]
+
+    def _folder(self, element: Element, file: Path) -> Path:
+        """What an included path is relative to."""
+        package = element.attributes.get("ros_pkg")
+        if package is None:
+            return file.parent
+        folders = self._options.ros_packages
+        if package not in folders:
+            raise CompileError(
+                element.attribute_place("ros_pkg"),
+                f"<include ros_pkg='{package}'>: the folder of this package is not known",
+                f"say where it is: --ros-package {package}=DIR" + (f"; {nearest(package, folders)}" if folders else ""),
+            )
+        return folders[package]
 
     def _take(self, element: Element) -> None:
         if element.tag == "BehaviorTree":
-            tree_id = element.attributes.get("ID", "")
-            if not tree_id or tree_id in self.documents.trees:
-                first = f"the other one: {self.documents.trees[tree_id].place}" if tree_id else ""
+            element.only("ID", "name", "description")
+            # BehaviorTree.CPP accepts a lone tree without an ID; two of them meet here.
+            tree_id = element.attributes.get("ID") or UNNAMED
+            if tree_id in self.documents.trees:
+                first = f"the other one: {self.documents.trees[tree_id].place}"
                 raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
             if len(element.children) != 1:
                 raise CompileError(

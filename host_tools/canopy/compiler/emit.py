@@ -22,15 +22,21 @@ from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.image_catalogue import Catalogue
 from canopy.compiler.image_room import exchangeable, image_cost, make_room
+from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
+    entry_note,
     entry_type,
     function_names,
+    item_type,
     parameters,
+    place_constant,
     port_members,
     prototypes,
+    row_fields,
     setters,
     stale_test,
+    text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
@@ -191,7 +197,7 @@ def _queues(table: Table) -> list[PortType]:
 
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
-    return f"{Path(place.file).name}:{place.line}"
+    return f"{os.path.basename(place.file)}:{place.line}"
 
 
 def _identifier(text: str) -> str:
@@ -225,6 +231,11 @@ def environment(bus: Bus) -> jinja2.Environment:
         "port_members": port_members,
         "setters": setters,
         "entry_type": entry_type,
+        "entry_note": entry_note,
+        "item_type": item_type,
+        "text_constants": text_constants,
+        "place_constant": place_constant,
+        "row_fields": row_fields,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
     }
@@ -235,7 +246,9 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
     """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
     templates = environment(bus)
     return {
-        f"{bus.name}_bus.{suffix}": templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        f"{bus.name}_bus.{suffix}": layout(
+            templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+        )
         for suffix in ("h", "c")
     }
 
@@ -251,6 +264,7 @@ def render(application: Application) -> dict[str, str]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
         "image": application.images,
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
@@ -263,7 +277,7 @@ def render(application: Application) -> dict[str, str]:
     }
     files = render_bus(application.bus, application.period_ms)
     files |= {
-        file: environment(application.bus).get_template(template).render(context)
+        file: layout(environment(application.bus).get_template(template).render(context))
         for file, template in templates.items()
     }
     files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"

@@ -16,6 +16,7 @@ from canopy.compiler.image_catalogue import Catalogue
 from canopy.compiler.image_names import base_signature, entry_signature, hash64, is_fixed, leaf_signature, target_of
 from canopy.compiler.image_room import Room
 from canopy.compiler.leaf_model import Port
+from canopy.compiler.numbers import exact
 from canopy.compiler.table import Row, Table
 from canopy.compiler.tree import Bound, Node
 
@@ -51,7 +52,7 @@ def _number(text: str, port: Port) -> int:
     if port.type.kind == "float":
         form = "f" if port.type.c == "float" else "d"
         return int.from_bytes(struct.pack(f"<{form}", float(text)), "little")
-    value = int(text, 0)
+    value = int(exact(text) / port.type.scale) if port.type.kind == "fixed" else int(text, 0)
     return value if value >= 0 else value + (port.type.high - port.type.low + 1)
 
 

@@ -31,7 +31,8 @@ def engine_hash() -> int:
 
 def type_signature(kind: PortType) -> str:
     """The type, as far as C knows it; of the user's own types only the name."""
-    return f"{kind.kind} {kind.c}"
+    step = f"*{kind.scale}" if kind.kind == "fixed" else ""
+    return f"{kind.kind} {kind.c}{step}"
 
 
 def leaf_signature(leaf: Leaf) -> str:
@@ -73,7 +74,7 @@ def is_fixed(port: Port, bound: Bound) -> bool:
     if isinstance(target, SignalName):
         return True
     if isinstance(target, Entry):
-        return port.type.kind == "text"
+        return port.type.kind == "text" and not port.writes
     return target is not None and port.type.kind == "user"
 
 

@@ -3,9 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.leaf_model import Leaf, Port
+from canopy.compiler.names import snake
+from canopy.compiler.numbers import plain
+from canopy.compiler.port_types import PortType
+
+if TYPE_CHECKING:
+    from canopy.compiler.table import Row
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
 
@@ -80,14 +89,16 @@ def _spaced(c_type: str) -> str:
 
 def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[tuple[str, str]]:
     """(declaration, comment) of the members of the ports struct that a port becomes."""
-    notes = [port.description] if port.description else []
+    notes = [port.description.rstrip(".") + "."] if port.description else []
     if port.type.kind == "duration":
         notes.insert(0, "[ms]")
+    if port.type.kind == "fixed":
+        notes.insert(0, f"In steps of {plain(port.type.scale)}.")
     if not port.writes:
         c_type = f"const {port.type.c} *" if port.type.kind == "user" else port.type.c
         return [(f"{_spaced(c_type)}{port.c_name};", " ".join(notes))]
     notes.append(f"Written with {leaf.c_name}_set_{port.c_name}().")
-    members = [(f"{port.type.c} *{port.c_name};", " ".join(notes))]
+    members = [(f"{_stored(port.type)} *{port.c_name};", " ".join(notes))]
     if (leaf.id, port.name) in counted:
         members.append((f"uint32_t *{port.c_name}_updates;", "Counts the writes, for nodes that wait for them."))
     return members
@@ -101,12 +112,15 @@ def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
             continue
         is_user = port.type.kind == "user"
         value = f"const {port.type.c} *value" if is_user else f"{port.type.c} value"
+        c = "*value" if is_user else "value"
+        if port.type.kind == "text":
+            value, c = f"{leaf.text_type} value", "(uint16_t)value"
         lines = [
             f"/** Writes port {port.name}. Nothing happens where the tree does not connect it. */",
             f"static inline void {leaf.c_name}_set_{port.c_name}(const {leaf.c_name}_ports_t *ports, {value})",
             "{",
             f"    if (ports->{port.c_name} != NULL) {{",
-            f"        *ports->{port.c_name} = {'*' if is_user else ''}value;",
+            f"        *ports->{port.c_name} = {c};",
             "    }",
         ]
         if (leaf.id, port.name) in counted:
@@ -119,6 +133,57 @@ def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
     return functions
 
 
+def place_constant(app: str, leaf: Leaf | None) -> str:
+    """Name of the constant that is a kind's place in the table of leaves or of control nodes; None: runs scripts."""
+    if leaf is None:
+        return f"{app}_leaf_run_script".upper()
+    return f"{app}_{'control' if leaf.is_inner else 'leaf'}_{leaf.c_name}".upper()
+
+
+def row_fields(app: str, row: Row) -> list[str]:
+    """The members of a node's entry in the node table; those that its type does not use are left out."""
+    node = row.node
+    fields = [f".type = {node.type.enum}"]
+    if row.asks:
+        fields.append(f".asks = {row.asks}")
+    fields += [f".parent = {row.parent}", f".end = {row.end}"]
+    if node.type.words:
+        fields.append(f".state = {row.state}")
+    if node.leaf is not None or node.script is not None:
+        fields.append(f".leaf = {place_constant(app, node.leaf)}")
+    if node.leaf is not None or node.script is not None or node.parameters:
+        fields.append(f".parameter = {row.parameter}")
+    return fields
+
+
+def _stored(kind: PortType) -> str:
+    return "uint16_t" if kind.kind == "text" else kind.c
+
+
 def entry_type(entry: Entry) -> str:
     """The C type of an entry's member. Texts are places in the table of texts."""
-    return "uint16_t" if entry.type.kind == "text" else entry.type.c
+    return _stored(entry.type)
+
+
+def item_type(queue: PortType) -> str:
+    """The C type of a queue's items."""
+    return "uint16_t" if queue.holds_texts else queue.item
+
+
+def writes_texts(leaf: Leaf) -> bool:
+    """Does the leaf have an output port of texts, or of a queue of them?"""
+    return any(port.writes and port.type.holds_texts for port in leaf.ports)
+
+
+def text_constants(leaf: Leaf, texts: Sequence[str]) -> list[tuple[str, int, str]]:
+    """(C name, place in the table, text) of what the leaf may write."""
+    if not writes_texts(leaf):
+        return []
+    return [(f"{leaf.c_name}_{snake(text)}".upper(), texts.index(text), text) for text in leaf.texts]
+
+
+def entry_note(entry: Entry) -> str:
+    """What a reader of the entry's member must know of its type."""
+    if entry.type.kind == "fixed":
+        return f"; in steps of {plain(entry.type.scale)}"
+    return "; place in the table of texts" if entry.type.kind == "text" else ""

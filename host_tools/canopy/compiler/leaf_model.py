@@ -10,7 +10,8 @@
 
 Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction unless it says so), `reads` and `writes`
 (messages of the DBC, separated by spaces), `stale` (what the leaf returns while a message it reads is not fresh:
-FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state).
+FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state), `texts` (what the node may
+write to its output ports of texts, separated by semicolons: texts are constants).
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 
@@ -30,7 +31,19 @@ from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
 
-METADATA = ("kind", "reads", "writes", "stale", "state", "returns", "undoes", "achieves", "moves", "hysteresis")
+METADATA = (
+    "kind",
+    "reads",
+    "writes",
+    "stale",
+    "state",
+    "texts",
+    "returns",
+    "undoes",
+    "achieves",
+    "moves",
+    "hysteresis",
+)
 ACTION_KINDS = ("SyncAction", "StatefulAction")
 INNER_KINDS = ("Control", "Decorator")
 STALE = ("FAILURE", "SUCCESS")
@@ -41,6 +54,7 @@ PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
     "input_port": "in",
     "output_port": "out",
     "inout_port": "inout",
+    "bidirectional_port": "inout",  # the name in older models
 }
 MODEL_TAGS = ("Action", "Condition", "Control", "Decorator", "SubTree")
 
@@ -80,6 +94,7 @@ class Leaf:
     writes: tuple[str, ...] = ()
     stale: str = "FAILURE"
     state: str | None = None
+    texts: tuple[str, ...] = ()
     returns: tuple[str, ...] = ()
     undoes: tuple[str, ...] = ()
     achieves: tuple[str, ...] = ()
@@ -90,6 +105,11 @@ class Leaf:
     def c_name(self) -> str:
         """Stem of the C functions: `walk_home` of `WalkHome`."""
         return snake(self.id)
+
+    @property
+    def text_type(self) -> str:
+        """The C enum of the texts that it may write."""
+        return f"{self.c_name}_text_t"
 
     @property
     def is_inner(self) -> bool:
@@ -112,6 +132,7 @@ class _Draft:
 
 
 def _read_port(element: Element, options: Options) -> Port:
+    element.only("name", "type", "default", "description")
     name = element.attributes.get("name", "")
     if not is_c_identifier(snake(name)) or not name:
         raise CompileError(element.place, f"<{element.tag}> needs a name that can be a C identifier, not '{name}'")
@@ -150,6 +171,16 @@ def _one_of(draft: _Draft, key: str, allowed: tuple[str, ...], default: str) -> 
 
 def _words(draft: _Draft, key: str) -> tuple[str, ...]:
     return tuple(draft.metadata.get(key, ("", None))[0].split())
+
+
+def _texts(draft: _Draft, leaf_id: str) -> tuple[str, ...]:
+    text, place = draft.metadata.get("texts", ("", Place("")))
+    texts = tuple(part.strip() for part in text.split(";") if part.strip())
+    names = [snake(part) for part in texts]
+    for part, name in zip(texts, names, strict=True):
+        if not name.strip("_") or names.count(name) > 1:
+            raise CompileError(place, f"texts of '{leaf_id}': '{part}' gives no C name of its own, but '{name}'")
+    return texts
 
 
 def _returns(draft: _Draft, kind: str) -> tuple[str, ...]:
@@ -212,6 +243,7 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         writes=_words(draft, "writes"),
         stale=_one_of(draft, "stale", STALE, "FAILURE"),
         state=state,
+        texts=_texts(draft, leaf_id),
         returns=_returns(draft, kind),
         undoes=_words(draft, "undoes"),
         achieves=_words(draft, "achieves"),
@@ -235,6 +267,7 @@ def read_model(model: Element, into: Declarations, options: Options, built_in: f
         node_id = element.attributes.get("ID", "")
         if not node_id:
             raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
+        element.only("ID", "name", "editable", "description")
         if element.tag == "SubTree":
             into.subtrees[node_id] = tuple(_read_draft(element, node_id, options).ports)
             continue

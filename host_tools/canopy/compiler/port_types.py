@@ -6,20 +6,26 @@ from __future__ import annotations
 import difflib
 import html
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from pathlib import Path
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import is_c_identifier
+from canopy.compiler.numbers import exact, plain
 
-Kind = Literal["bool", "int", "duration", "float", "text", "user", "any"]
+Kind = Literal["bool", "int", "fixed", "duration", "float", "text", "user", "any"]
 
 
 @dataclass(frozen=True)
 class PortType:
     """A type. `c` is the C type of an entry or port; `low` and `high` are the limits of whole numbers.
 
-    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items.
+    Fixed point is a whole number of steps: the value in C times `scale` is what the tree's texts and scripts mean.
+
+    A queue is a type like the user's own, made by the compiler: `item` is the C type of its `capacity` items. Texts in
+    entries and queues are places in the application's table of texts.
     """
 
     kind: Kind
@@ -28,14 +34,22 @@ class PortType:
     high: int = 0
     item: str = ""
     capacity: int = 0
+    scale: Fraction = Fraction(1)
 
     def __str__(self) -> str:
+        if self.kind == "fixed":
+            return f"{self.c} in steps of {plain(self.scale)}"
         return {"text": "a constant text", "duration": "a duration [ms]", "any": "any type"}.get(self.kind, self.c)
+
+    @property
+    def holds_texts(self) -> bool:
+        """Is it a text, or a queue of texts?"""
+        return self.kind == "text" or self.item == TEXT.c
 
     @property
     def is_number(self) -> bool:
         """Can scripts compute with it?"""
-        return self.kind in ("bool", "int", "duration", "float")
+        return self.kind in ("bool", "int", "fixed", "duration", "float")
 
 
 def _integer(bits: int, *, signed: bool) -> PortType:
@@ -47,6 +61,7 @@ BOOL = PortType("bool", "bool", 0, 1)
 INT32 = _integer(32, signed=True)
 INT64 = _integer(64, signed=True)
 DURATION = PortType("duration", "uint32_t", 0, 2**32 - 1)
+FLOAT = PortType("float", "float")
 DOUBLE = PortType("float", "double")
 TEXT = PortType("text", "const char *")
 ANY = PortType("any", "")
@@ -65,8 +80,12 @@ PORT_TYPES: dict[str, PortType] = {
     "long": INT64,
     "unsigned long": _integer(64, signed=False),
     "size_t": _integer(64, signed=False),
-    "float": PortType("float", "float"),
+    "float": FLOAT,
     "double": DOUBLE,
+    # As in the messages of ROS.
+    **{f"{u}int{bits}": _integer(bits, signed=not u) for u in ("", "u") for bits in (8, 16, 32, 64)},
+    "float32": FLOAT,
+    "float64": DOUBLE,
     "std::string": TEXT,
     "std::string_view": TEXT,
     "const char *": TEXT,
@@ -83,29 +102,57 @@ PORT_TYPES: dict[str, PortType] = {
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says about types."""
+    """What the command line says about types, and where the ROS packages are whose trees may be included."""
 
     floats: bool = False
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
+    ros_packages: dict[str, Path] = field(default_factory=dict)
+    any_type: bool = False  # types for which there is nothing in C are accepted
+
+
+# For tools that make no C.
+ANY_TYPE = Options(floats=True, any_type=True)
 
 
 def _normal(name: str) -> str:
     """One spelling for `std::vector< int >`, `std::__cxx11::basic_string<…>`, `std::ratio<1l, 1000l>`, `&lt;`."""
     text = html.unescape(name).strip().replace("std::__cxx11::", "std::").replace("std::__1::", "std::")
-    text = re.sub(r"\s*([<>,*])\s*", r"\1", text)
+    text = re.sub(r"\s*([<>,*/])\s*", r"\1", text)
     text = re.sub(r"\b(\d+)[lL]+\b", r"\1", text).replace("const char*", "const char *")
     return re.sub(r"\s+", " ", text.removeprefix("const ") if "*" not in text else text)
 
 
-_QUEUE = re.compile(r"(?P<item>[\w ]+?) ?\[(?P<capacity>\d{1,5})\]")
+_QUEUE = re.compile(r"(?P<item>[\w: ]+?) ?\[(?P<capacity>\d{1,5})\]")
 MAX_CAPACITY = 65_535
 
 
 def _queue(item: PortType, capacity: int, where: str, place: Place) -> PortType:
-    if item.kind not in ("bool", "int", "float") or not 1 <= capacity <= MAX_CAPACITY:
-        raise CompileError(place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers", "for example type='int32_t[8]'")
-    return PortType("user", f"canopy_queue_{item.c.removesuffix('_t')}_{capacity}_t", item=item.c, capacity=capacity)
+    if item.kind not in ("bool", "int", "float", "text") or not 1 <= capacity <= MAX_CAPACITY:
+        raise CompileError(
+            place, f"{where}: a queue has 1 to {MAX_CAPACITY} numbers or texts", "for example type='int32_t[8]'"
+        )
+    name = "text" if item == TEXT else item.c.removesuffix("_t")
+    return PortType("user", f"canopy_queue_{name}_{capacity}_t", item=item.c, capacity=capacity)
+
+
+# int16_t*0.01, as a DBC has its factors; int16_t/256, as in binary fixed point.
+_FIXED = re.compile(r"(?P<base>[\w ]+)(?P<sign>[*/])(?P<step>\d+(\.\d+)?)")
+
+
+def is_fixed_point(name: str) -> bool:
+    """Is it a type like int16_t*0.01?"""
+    return _FIXED.fullmatch(_normal(name)) is not None
+
+
+def _fixed(base: PortType, sign: str, step: str, where: str, place: Place) -> PortType:
+    number = exact(step) if len(step) < 40 else Fraction(0)
+    if base.kind != "int" or number == 0:
+        raise CompileError(
+            place, f"{where}: '{base.c}{sign}{step}' is no fixed-point type", "for example type='int16_t*0.01'"
+        )
+    scale = number if sign == "*" else 1 / number
+    return base if scale == 1 else replace(base, kind="fixed", scale=scale)
 
 
 def read_type(name: str, where: str, place: Place, options: Options) -> PortType:
@@ -115,7 +162,7 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
         CompileError: it is no known type, or one that this application does not allow.
     """
     normal = _normal(name)
-    mapped = {_normal(key): value for key, value in options.type_map.items()}
+    mapped = {_normal(key): _normal(value) for key, value in options.type_map.items()}
     normal = mapped.get(normal, normal)
     known = PORT_TYPES.get(normal) or PORT_TYPES.get(normal.removeprefix("std::"))
     if known is not None:
@@ -129,6 +176,12 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     queue = _QUEUE.fullmatch(normal)
     if queue is not None:
         return _queue(read_type(queue["item"], where, place, options), int(queue["capacity"]), where, place)
+    fixed = _FIXED.fullmatch(normal)
+    if fixed is not None:
+        base = read_type(fixed["base"], where, place, options)
+        return _fixed(base, fixed["sign"], fixed["step"], where, place)
+    if options.any_type:
+        return PortType("user", normal)
     if not is_c_identifier(normal):
         raise CompileError(
             place,
@@ -176,17 +229,36 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
                 "name a constant of that type (an enum's), or connect an entry: {name}",
             )
         return text
-    return integer(text, kind, where, place)
-
-
-def integer(text: str, kind: PortType, where: str, place: Place) -> str:
-    """The C literal of a whole number."""
+    if kind.kind == "fixed":
+        return integer(_steps(text, kind, where, place), kind)
     try:
         value = int(text, 0)
     except ValueError:
         raise CompileError(place, f"{where}: '{text}' is not a whole number ({kind.c})") from None
     if not kind.low <= value <= kind.high:
         raise CompileError(place, f"{where}: {value} is outside {kind.c} [{kind.low}, {kind.high}]")
+    return integer(value, kind)
+
+
+def _steps(text: str, kind: PortType, where: str, place: Place) -> int:
+    """How many steps of a fixed-point type a text in physical units is."""
+    try:
+        steps = exact(text) / kind.scale
+    except ValueError:
+        raise CompileError(place, f"{where}: '{text}' is not a number ({kind})") from None
+    if steps.denominator != 1:
+        near = [plain(whole * kind.scale) for whole in (steps.__floor__(), steps.__ceil__())]
+        raise CompileError(
+            place, f"{where}: {text} lies between two steps of {plain(kind.scale)}", f"write {near[0]} or {near[1]}"
+        )
+    if not kind.low <= steps <= kind.high:
+        ends = (plain(kind.low * kind.scale), plain(kind.high * kind.scale))
+        raise CompileError(place, f"{where}: {text} is outside {kind} [{ends[0]}, {ends[1]}]")
+    return int(steps)
+
+
+def integer(value: int, kind: PortType) -> str:
+    """The C literal of a whole number, or of a number of steps, that the type can hold."""
     bits = int("".join(c for c in kind.c if c.isdigit()))
     macro = f"{'U' if kind.low == 0 else ''}INT{bits}_C"
     return f"({macro}({value + 1}) - 1)" if value == kind.low and value < 0 else f"{macro}({value})"

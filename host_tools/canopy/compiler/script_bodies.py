@@ -6,7 +6,8 @@ from __future__ import annotations
 from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.port_types import TEXT, literal
-from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess, stripped
+from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess
+from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
 from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
 from canopy.compiler.tree import Script
@@ -123,10 +124,11 @@ class Bodies:
         assert script.type is not None
         kind = queue.type
         if kind.item != script.type.c:
+            items, name = ("texts", "std::string") if script.type == TEXT else (script.type.c, script.type.c)
             raise ScriptError(
                 0,
-                f"entry '{queue.name}' is {kind}, and a queue of {script.type.c} is needed",
-                f"declare the port that fills it as type='{script.type.c}[8]'",
+                f"entry '{queue.name}' is {kind}, and a queue of {items} is needed",
+                f"declare the port that fills it as type='{name}[8]'",
             )
         member = f"app->entries.{queue.c_name}"
         return [
@@ -154,16 +156,16 @@ class Bodies:
         if isinstance(source, str) and target.type.kind in ("user", "float"):
             c = literal(source, target.type, "value", script.place())
         elif isinstance(source, str) and target.type == TEXT:
-            c = compiler.convert(TextConst(source), TEXT, 0)
+            c = compiler.storing.convert(TextConst(source), TEXT, 0)
         else:
             value = guess(source) if isinstance(source, str) else compiler.target_value(source, 0)
-            c = compiler.convert(value, target.type, 0)
+            c = compiler.storing.convert(value, target.type, 0)
         return [*compiler.store(target, c), "return 1;"]
 
     def _parameter(self, compiler: Compiler, script: Script) -> list[str]:
         assert script.target is not None
         value = compiler.target_value(script.target, 0)
-        return [f"return {stripped(compiler.parameter(value, script.least))};"]
+        return [f"return {stripped(compiler.storing.parameter(value, script.least))};"]
 
 
 def initial_lines(entry: Entry, texts: Texts) -> list[str]:

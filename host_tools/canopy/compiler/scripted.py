@@ -113,6 +113,25 @@ def _precondition(context: Context, element: Element, scope: Scope, xml_name: st
     return _node("Precondition", xml_name, element, (script, _status(element, "else", "FAILURE")))
 
 
+def _test_node(context: Context, element: Element, scope: Scope, xml_name: str) -> Node:
+    scripts = ("success_script", "failure_script", "post_script")
+    _check(element, ("return_status", "async_delay", *scripts))
+    status = _status(element, "return_status", "SUCCESS")
+    if status == STATUSES["RUNNING"]:
+        raise CompileError(
+            element.attribute_place("return_status"),
+            "return_status='RUNNING' would never be done",
+            "<KeepRunningUntilFailure><AlwaysSuccess/></KeepRunningUntilFailure> is RUNNING for ever",
+        )
+    text = element.attributes.get("async_delay", "0")
+    if not text.isdecimal() or int(text) >= 2**31:
+        raise CompileError(
+            element.attribute_place("async_delay"), f"async_delay='{text}' is no time in ms", "0 to 2147483647"
+        )
+    parameters = [context.script("action", element, s, scope) if element.attributes.get(s) else -1 for s in scripts]
+    return _node("TestNode", xml_name, element, (status, int(text), *parameters))
+
+
 def _updated(context: Context, element: Element, scope: Scope, xml_name: str) -> Node:
     _check(element, ("entry",))
     target = context.entry(element, "entry", scope, f"<{xml_name} entry>", writes=False, kind=ANY)
@@ -168,6 +187,7 @@ SCRIPTED: dict[str, Maker] = {
     "SetBlackboard": _set,
     "UnsetBlackboard": _set,
     "Precondition": _precondition,
+    "TestNode": _test_node,
     "SkipUnlessUpdated": _updated,
     "WaitValueUpdate": _updated,
     "WasEntryUpdated": _updated,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import prototypes
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.table import Table
@@ -57,7 +58,7 @@ def stubs(name: str, table: Table, bus: Bus) -> str:
         leaf = use.leaf
         parts.append(f"/* {leaf.id} ({leaf.kind}), declared at {Path(leaf.place.file).name}:{leaf.place.line} */\n")
         parts += [_function(leaf, prototype) for prototype in prototypes(leaf, bus)]
-    return "\n".join(parts)
+    return layout("\n".join(parts))
 
 
 def write_stubs(path: Path, text: str) -> None:

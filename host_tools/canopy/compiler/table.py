@@ -71,6 +71,15 @@ class Table:
         """Entries of the leaf table."""
         return len(self.leaves) + int(self.script_leaf)
 
+    def parameter_notes(self) -> list[tuple[Node, str]]:
+        """For each parameter the first node that has it, and its name there."""
+        notes: dict[int, tuple[Node, str]] = {}
+        for row in self.rows:
+            if row.node.leaf is None and row.node.script is None:
+                for which, parameter in enumerate(row.node.type.parameters[: len(row.node.parameters)]):
+                    notes.setdefault(row.parameter + which, (row.node, parameter.name))
+        return [notes[index] for index in range(len(self.parameters))]
+
     @property
     def hash(self) -> str:
         """16 hex digits that change whenever the tables do."""

@@ -84,7 +84,10 @@ class Node:
 
 @dataclass(frozen=True)
 class Tree:
-    """A checked tree: its ID, the files it came from (the main one first), the root, and what its names stand for."""
+    """A checked tree: its ID, the files it came from (the main one first), the root, and what its names stand for.
+
+    `used`: the IDs of the trees that it is made of; `unused`: the main file's others, by ID.
+    """
 
     id: str
     path: Path
@@ -93,3 +96,5 @@ class Tree:
     files: tuple[Path, ...] = ()
     board: Blackboard = field(default_factory=Blackboard)
     scripts: tuple[Script, ...] = ()
+    used: frozenset[str] = frozenset()
+    unused: dict[str, Element] = field(default_factory=dict)

@@ -6,6 +6,7 @@ A <SubTree> costs no node: the root of its tree stands in its place, with a scop
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Co
 from canopy.compiler.tree import Bound, Node, Script, Tree
 from canopy.compiler.xml_reader import Element
 
-__all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree"]
+__all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree", "read_unused_trees"]
 
 MAX_NODES = 65_534
 MAX_SUBTREE_DEPTH = 1_000
@@ -35,7 +36,7 @@ USER_KINDS = ("Condition", "SyncAction", "StatefulAction")
 INTERNAL = ("Attributes", "Loop", "Switch", "Control", "Decorator")
 
 # Of BehaviorTree.CPP 4, and known to be missing here: refused by name, not as a typing error.
-NOT_SUPPORTED = frozenset(("TestNode", "ManualSelector"))
+NOT_SUPPORTED = frozenset(("ManualSelector",))
 
 EXPLICIT = {"Action": "LEAF", "Condition": "LEAF", "Control": "CONTROL", "Decorator": "DECORATOR"}
 
@@ -77,10 +78,12 @@ class _Builder:
         self._built_in = built_in_types()
         self.context = Context(options, Blackboard())
         self._count = 0
+        self.used: set[str] = set()
 
     def build(self, tree_id: str) -> Node:
         """The whole tree. A loop, not recursion: trees may be as deep as they are large."""
         main = _Instance(self.context.board.main, tree_id, (tree_id,))
+        self.used.add(tree_id)
         self._main_ports(main.scope, tree_id)
         root, inner, element, instance = self._expand(self._trees[tree_id].children[0], main)
         waiting = [(inner, element, instance)]
@@ -91,7 +94,19 @@ class _Builder:
                 node.children.append(outer)
                 if inner_element.children:
                     waiting.append((inner, inner_element, inner_instance))
+            self._check_handler(node)
         return root
+
+    @staticmethod
+    def _check_handler(node: Node) -> None:
+        """A halt is no tick: what it ticks is a leaf with a function."""
+        if node.type.name == "TryCatch" and node.parameters != (0,) and node.children[-1].type.name not in USER_KINDS:
+            raise CompileError(
+                node.children[-1].place,
+                "with catch_on_halt the last child of <TryCatch> must be a leaf of yours or a Script, "
+                "without pre- and postconditions",
+                "a halt cannot go down a tree: do the clean-up in one leaf",
+            )
 
     def _main_ports(self, scope: Scope, tree_id: str) -> None:
         """The ports of the main tree are what the program itself writes and reads."""
@@ -147,6 +162,7 @@ class _Builder:
             raise CompileError(element.place, f"subtrees are nested more than {MAX_SUBTREE_DEPTH} deep")
         if element.children:
             raise CompileError(element.children[0].place, f"<SubTree ID='{tree_id}'> cannot have children")
+        self.used.add(tree_id)
         name = outer.unique(element.attributes.get("name", tree_id))
         path = f"{outer.scope.path}/{name}".lstrip("/")
         autoremap = element.attributes.get("_autoremap", "false")
@@ -216,7 +232,9 @@ class _Builder:
         count = len(element.children)
         if node.leaf is not None and not node.leaf.is_inner and count:
             raise CompileError(element.children[0].place, f"'{node_id}' is a leaf and cannot have children")
-        if not node.type.least_children <= count <= node.type.most_children:
+        if not node.type.least_children <= count <= min(node.type.most_children, MAX_NODES):
+            if count > MAX_NODES:
+                raise CompileError(element.place, f"the tree has more than {MAX_NODES} nodes")
             raise CompileError(
                 element.place, f"<{node_id}> needs {node.type.arity_text()} child node(s), and has {count}"
             )
@@ -250,7 +268,11 @@ class _Builder:
         if text is None:
             if port.direction == "out":
                 return Bound(port, place)
-            raise CompileError(element.place, f"'{leaf.id}' needs a value for its port '{port.name}'")
+            raise CompileError(
+                element.place,
+                f"'{leaf.id}' needs a value for its port '{port.name}'",
+                f"or give the port a default where it is declared: {port.place}",
+            )
         name = pointer(text, port.name)
         if name is None:
             if port.writes:
@@ -269,12 +291,6 @@ class _Builder:
 
     def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
         own = {parameter.name for parameter in kind.parameters}
-        if kind.name == "TryCatch":
-            own.add("catch_on_halt")
-            if element.attributes.get("catch_on_halt", "false") != "false":
-                raise CompileError(
-                    element.place, "catch_on_halt is not supported", "give the last child's work to a halt handler"
-                )
         self._check_attributes(element, own)
         parameters = tuple(self._parameter(element, parameter, scope) for parameter in kind.parameters)
         name = element.attributes.get("name", kind.name)
@@ -324,14 +340,48 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
     """
     options = options or Options()
     documents = read_documents(path, options, _built_in_names())
+    return _expand(path, documents, options, documents.main)
+
+
+def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tuple[str, Tree | CompileError]]:
+    """The file's trees that are no part of its main tree: each that is no part of another one, or why it cannot be."""
+    documents = read_documents(path, options, _built_in_names())
+    inner = {ref for element in tree.unused.values() for ref in _subtrees(element)}
+    seen: set[str] = set()
+    # Those that no other one has come first; the rest is seen with them, but for trees that contain each other.
+    for tree_id in sorted(tree.unused, key=lambda name: name in inner):
+        if tree_id in seen:
+            continue
+        try:
+            found = _expand(path, documents, options, tree_id)
+        except CompileError as error:
+            yield tree_id, error
+            continue
+        seen |= found.used
+        yield tree_id, found
+
+
+def _subtrees(element: Element) -> Iterator[str]:
+    waiting = [element]
+    while waiting:
+        part = waiting.pop()
+        waiting.extend(part.children)
+        if part.tag == "SubTree":
+            yield part.attributes.get("ID", "")
+
+
+def _expand(path: Path, documents: Documents, options: Options, tree_id: str) -> Tree:
     builder = _Builder(documents, options)
-    root = builder.build(documents.main)
+    root = builder.build(tree_id)
+    own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
     return Tree(
-        id=documents.main,
+        id=tree_id,
         path=path,
         root=root,
         leaves=documents.declarations.leaves,
         files=tuple(documents.files),
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
+        used=frozenset(builder.used),
+        unused={name: element for name, element in own.items() if name not in builder.used},
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.errors import CompileError, Place, nearest
 
 MAX_BYTES = 16 * 1024 * 1024
 MAX_DEPTH = 65_534
@@ -29,21 +29,42 @@ class Element:
     text: str = ""
     source: bytes = field(default=b"", repr=False)
     offset: int = 0
+    _values: dict[bytes, tuple[int, int]] | None = field(default=None, repr=False)
 
     def attribute_place(self, name: str, index: int = 0) -> Place:
         """The place of character `index` of an attribute's value; the tag's place when the value cannot be found.
 
         Expat gives no places of attributes, so the tag is read again; `&lt;` and the like are one character.
         """
+        if self._values is None:
+            self._values = self._read_again()
+        start, end = self._values.get(name.encode(), (0, 0))
+        if not end:
+            return self.place
+        if index:
+            start += sum(map(len, _CHARACTER.findall(self.source[start:end])[:index]))
+        return self._place_of(start)
+
+    def only(self, *known: str) -> None:
+        """Refuses an attribute that is not known; not those of other namespaces, and what editors keep (`_…`).
+
+        Raises:
+            CompileError: with the attribute's place, and the nearest name.
+        """
+        for name in self.attributes:
+            if name not in known and ":" not in name and not name.startswith(("_", "xmlns")):
+                place = self.attribute_place(name)
+                raise CompileError(place, f"<{self.tag}> has no attribute '{name}'", nearest(name, known))
+
+    def _read_again(self) -> dict[bytes, tuple[int, int]]:
+        """Where each attribute's value begins and ends."""
+        values = {}
         position = _TAG_NAME.match(self.source, self.offset)
         while position is not None:
-            attribute = _ATTRIBUTE.match(self.source, position.end())
-            if attribute is not None and attribute["name"] == name.encode():
-                value = attribute["value"][1:-1]
-                before = b"".join(_CHARACTER.findall(value)[:index])
-                return self._place_of(attribute.start("value") + 1 + len(before))
-            position = attribute
-        return self.place
+            position = _ATTRIBUTE.match(self.source, position.end())
+            if position is not None:
+                values[position["name"]] = (position.start("value") + 1, position.end("value") - 1)
+        return values
 
     def _place_of(self, offset: int) -> Place:
         before = self.source[self.offset : offset].decode("utf-8", errors="replace")
@@ -55,6 +76,13 @@ class Element:
 _TAG_NAME = re.compile(rb"<[^\s/>]+")
 _ATTRIBUTE = re.compile(rb"\s+(?P<name>[^\s=/>]+)\s*=\s*(?P<value>\"[^\"]*\"|'[^']*')")
 _CHARACTER = re.compile(rb"&[^;]*;|[\x00-\x7f\xc0-\xff][\x80-\xbf]*", re.DOTALL)
+
+
+def unreadable_encoding(file: str, error: Exception) -> CompileError:
+    """For what expat raises when it does not know the encoding in the XML declaration."""
+    return CompileError(
+        Place(file, 1, 1), f"the encoding that the file names cannot be read: {error}", "save it as UTF-8"
+    )
 
 
 class _Builder:
@@ -101,6 +129,8 @@ class _Builder:
         except expat.ExpatError as error:
             place = Place(self._file, error.lineno, error.offset + 1)
             raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+        except (LookupError, ValueError) as error:
+            raise unreadable_encoding(self._file, error) from error
         assert self._root is not None  # expat refuses a document without an element
         return self._root
 

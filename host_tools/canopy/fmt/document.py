@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.xml_reader import MAX_BYTES, unreadable_encoding
+
+MAX_DEPTH = 5_000
 
 
 @dataclass
@@ -72,6 +75,9 @@ class _Reader:
         raise CompileError(place, "a document type declaration (<!DOCTYPE …>) is not accepted", "remove it")
 
     def _start(self, tag: str, attributes: list[str]) -> None:
+        if len(self._open) > MAX_DEPTH:
+            place = Place(self._file, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
+            raise CompileError(place, f"elements are nested more than {MAX_DEPTH} deep")
         element = Element(tag, list(zip(attributes[::2], attributes[1::2], strict=True)))
         self._open[-1].append(element)
         self._open.append(element.children)
@@ -106,12 +112,16 @@ def read_document(data: bytes, file: str) -> Document:
     """Reads a file's bytes.
 
     Raises:
-        CompileError: not well-formed XML, or a DOCTYPE.
+        CompileError: not well-formed XML, a DOCTYPE, too large, or nested too deep to be indented.
     """
+    if len(data) > MAX_BYTES:
+        raise CompileError(Place(file), f"the file has {len(data)} bytes; at most {MAX_BYTES} are read")
     reader = _Reader(file)
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
         place = Place(file, error.lineno, error.offset + 1)
         raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+    except (LookupError, ValueError) as error:
+        raise unreadable_encoding(file, error) from error
     return reader.document

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
+from canopy.compiler.cli import read_type_options, type_options
 from canopy.compiler.errors import CompileError
 from canopy.compiler.tree_reader import read_tree
 from canopy.show.dot import dot
@@ -32,7 +34,16 @@ def _write(target: str, text: str) -> None:
 @click.argument("tree", type=click.Path(path_type=Path))
 @click.option("--svg", "svg_file", metavar="FILE", help="Draw it as SVG into FILE; - is standard output.")
 @click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
-def command(tree: Path, svg_file: str | None, dot_file: str | None) -> None:
+@type_options
+def command(
+    tree: Path,
+    svg_file: str | None,
+    dot_file: str | None,
+    include: str | None,
+    floats: bool,
+    type_map: tuple[str, ...],
+    packages: tuple[str, ...],
+) -> None:
     """Draw TREE: in the terminal, as SVG, or as DOT.
 
     → Sequence, ? Fallback, ⇉ Parallel, * with memory (BehaviorTree.CPP's Sequence and Fallback have one, the Reactive
@@ -45,7 +56,8 @@ def command(tree: Path, svg_file: str | None, dot_file: str | None) -> None:
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree)
+        options = read_type_options(include, floats, type_map, packages)
+        checked = read_tree(tree, replace(options, floats=True, any_type=True))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)

@@ -44,15 +44,20 @@ class Look:
 
 
 def parameter_text(node: Node) -> str:
-    """The parameters as `3` or `success_count=1 failure_count=2`."""
-    values = (value.text if isinstance(value, Script) else value for value in node.parameters)
-    named = list(zip((parameter.name for parameter in node.type.parameters), values, strict=False))
-    return str(named[0][1]) if len(named) == 1 else " ".join(f"{name}={value}" for name, value in named)
+    """The parameters as `3` or `success_count=1 failure_count=2`, without the scripts that are not there."""
+    values = [value.text if isinstance(value, Script) else value for value in node.parameters]
+    named = list(zip(node.type.parameters, values, strict=False))
+    if node.type.name == "TryCatch":
+        return "" if values[0] == 0 else "catch_on_halt" if values[0] == 1 else f"catch_on_halt={values[0]}"
+    if len(named) == 1:
+        return str(values[0])
+    return " ".join(f"{parameter.name}={value}" for parameter, value in named if value != -1 or parameter.default)
 
 
 def look(node: Node, *, ascii_only: bool = False) -> Look:
     """The look of a node. `style` is rich's, for terminals."""
-    own_name = node.name if node.name != node.type.name else ""
+    kind = node.leaf.id if node.leaf is not None else node.type.name
+    own_name = node.name if node.name != kind else ""
     parameters = parameter_text(node)
     if node.type.category == "LEAF":
         text = node.name if node.leaf is not None or not parameters else f"{node.name} {parameters}"
@@ -62,11 +67,11 @@ def look(node: Node, *, ascii_only: bool = False) -> Look:
             return Look("", text, "box", "#e8e8e8", "#666666", "bright_black")
         return Look("", text, "box", "#ffffff", "#333333", "bold")
     if node.type.category == "CONTROL":
-        sign = SIGNS[node.type.name][ascii_only] if node.type.name in SIGNS else node.type.name
-        kind = node.type.name if node.type.name in AMBIGUOUS else ""
+        sign = SIGNS[node.type.name][ascii_only] if node.type.name in SIGNS else kind
+        kind = kind if kind in AMBIGUOUS else ""
         more = f"[{parameters}]" if parameters else ""
         text = " ".join(part for part in (kind, more, own_name) if part)
         return Look(sign, text, "box", "#dce8f7", "#2b5c9e", "bold cyan")
     more = f" {parameters}" if parameters else ""
-    text = f"{node.type.name}{more}" + (f" {own_name}" if own_name else "")
+    text = f"{kind}{more}" + (f" {own_name}" if own_name else "")
     return Look("d" if ascii_only else "δ", text, "diamond", "#fdf0c8", "#9a7414", "yellow")

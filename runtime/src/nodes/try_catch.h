@@ -4,12 +4,13 @@
  * TryCatch: all children but the last as a Sequence; when one fails, they are reset and the last child, the handler, is
  * ticked until it is done. Then the node fails, whatever the handler returned.
  *
- * State: the RUNNING child, valid while the node is RUNNING.
+ * Parameter: is the handler ticked, once, when the node is halted before it? Then it is a leaf, for a halt is no tick:
+ * it cannot go down a tree. State: the RUNNING child, valid while the node is RUNNING.
  */
 #ifndef CANOPY_NODES_TRY_CATCH_H
 #define CANOPY_NODES_TRY_CATCH_H
 
-#include "canopy/node.h"
+#include "leaf.h"
 
 static inline canopy_step_t canopy_try_catch_enter(canopy_tree_instance_t *self, uint16_t node)
 {
@@ -56,6 +57,32 @@ static CANOPY_SELDOM canopy_step_t canopy_try_catch_child(canopy_tree_instance_t
     }
     (void)canopy_reset_children(self, node, first);
     return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
+}
+
+/** The other children have been halted. Calls the leaf itself: what is shared with a tick is inlined there only. */
+static CANOPY_SELDOM void canopy_try_catch_halt(canopy_tree_instance_t *self, uint16_t node)
+{
+    uint16_t handler;
+    uint16_t parameter;
+    const canopy_leaf_t *leaf;
+    canopy_status_t status;
+
+    if (canopy_parameter(self, node, 0) == 0) {
+        return;
+    }
+    handler = canopy_try_catch_handler(self, node);
+    if (*canopy_words(self, node) == handler) {
+        return;
+    }
+    leaf = canopy_leaf(self, handler);
+    parameter = self->tree->nodes[handler].parameter;
+    status = leaf->tick(self->application, parameter);
+    if (canopy_is_simple_leaf(&self->tree->nodes[handler]) || status != CANOPY_RUNNING) {
+        status = canopy_leaf_checked(self, handler, status);
+    } else {
+        leaf->halted(self->application, parameter);
+    }
+    self->status[handler] = (uint8_t)((uint8_t)CANOPY_STATUS_WAS | (uint8_t)status);
 }
 
 #endif

@@ -243,6 +243,13 @@ class TryCatch(Node):
         self.index = 0
         self.skipped = 0
 
+    def on_halt(self) -> None:
+        self.reset_all()
+        if self.spec.parameters[0] and self.index < len(self.children):
+            self.children[-1].tick()
+            self.children[-1].reset()
+        self.begin()
+
     def tick_children(self) -> int:
         last = len(self.children) - 1
         while self.index < last:

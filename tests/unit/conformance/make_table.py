@@ -24,7 +24,8 @@ HEADER = """\
  *
  * "@ node children parameters..." begins a node. Its rows are the node's behaviour as a machine with states; 0 is the
  * start. "state | children return | node returns | calls | next state"
- *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; or halt or reset
+ *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; or halt or reset,
+ *                    with :letters when a child is asked then
  *   calls            in order: a ticked, a' ticked while it is RUNNING, a! halted; - none
  * One row is one millisecond. Every path of rows is a test: so the rows hold every combination of statuses for any
  * number of ticks, and a status that is not asked for is not written out four times.
@@ -52,8 +53,9 @@ def cases() -> Iterator[tuple[str, int, tuple[int, ...]]]:
         yield "ParallelAll", children, (most,)
     for children, needed in ((1, 1), (2, 1), (2, 2), (3, 1), (3, 2), (3, 3), (3, -1)):
         yield "ReactiveParallel", children, (needed,)
-    for name in ("IfThenElse", "WhileDoElse", "TryCatch"):
+    for name in ("IfThenElse", "WhileDoElse"):
         yield from ((name, children, ()) for children in (2, 3))
+    yield from (("TryCatch", children, (catch_on_halt,)) for catch_on_halt in (0, 1) for children in (2, 3))
     for name in ("Inverter", "ForceSuccess", "ForceFailure", "KeepRunningUntilFailure"):
         yield name, 1, ()
     for name in ("Repeat", "RetryUntilSuccessful"):
@@ -73,26 +75,31 @@ def start(name: str, children: int, parameters: tuple[int, ...]) -> model.Node:
     return kind(children, *parameters)
 
 
+def operation_of(step: str) -> str:
+    """Of "haltS": halt. Of a tick: nothing."""
+    return step.rstrip(STATUSES)
+
+
+def answers_of(step: str) -> str:
+    """Of "haltS": S."""
+    return step[len(operation_of(step)) :]
+
+
 def replay(fresh: model.Node, steps: list[str]) -> tuple[model.Node, list[int]]:
     """Take the steps; also which children the last one asked, in order."""
     asked: list[int] = []
     for step in steps:
         asked = []
-        if step == "halt":
-            fresh.halt()
-        elif step == "reset":
-            fresh.reset()
-        else:
-            answers = iter(step)
+        answers = iter(answers_of(step))
 
-            def answer(child: int, answers: Iterator[str] = answers, asked: list[int] = asked) -> str:
-                asked.append(child)
-                try:
-                    return next(answers)
-                except StopIteration:
-                    raise NotAnsweredError from None
+        def answer(child: int, answers: Iterator[str] = answers, asked: list[int] = asked) -> str:
+            asked.append(child)
+            try:
+                return next(answers)
+            except StopIteration:
+                raise NotAnsweredError from None
 
-            fresh.tick(answer)
+        {"": fresh.tick, "halt": fresh.halt, "reset": fresh.reset}[operation_of(step)](answer)
     return fresh, asked
 
 
@@ -114,10 +121,10 @@ def rows(name: str, children: int, parameters: tuple[int, ...]) -> Iterator[str]
             if node.state() not in numbers:
                 numbers[node.state()] = len(histories)
                 histories.append([*histories[number], step])
-            shown = step
-            if step not in ("halt", "reset"):
-                answered = dict(zip(asked, step, strict=True))
-                shown = "".join(answered.get(child, ".") for child in range(children))
+            answered = dict(zip(asked, answers_of(step), strict=True))
+            letters = "".join(answered.get(child, ".") for child in range(children))
+            operation = operation_of(step)
+            shown = f"{operation}:{letters}" if operation and answered else operation or letters
             yield f"{number} | {shown} | {node.status} | {node.calls or '-'} | {numbers[node.state()]}"
 
 

@@ -59,18 +59,19 @@ class Node:
         self.pass_time()
         return self.status
 
-    def halt(self) -> None:
+    def halt(self, ask: Ask) -> None:
         """Halt the tree: children first. What a node keeps while RUNNING or through a SKIPPED child is forgotten."""
         self.calls = ""
+        self._ask = ask
         self.reset_all()
         if self.status in "RK":
             self.on_halt()
         self.status = "I"
         self.pass_time()
 
-    def reset(self) -> None:
+    def reset(self, ask: Ask) -> None:
         """Halt the tree and forget everything."""
-        self.halt()
+        self.halt(ask)
         self.forget()
 
     def state(self) -> tuple[object, ...]:
@@ -303,7 +304,7 @@ class WhileDoElse(Node):
 
 
 class TryCatch(Node):
-    """All children but the last as a Sequence; the last one when that fails."""
+    """All children but the last as a Sequence; the last one when that fails. Parameter: catch_on_halt."""
 
     def forget(self) -> None:
         """Start at the first child."""
@@ -314,6 +315,13 @@ class TryCatch(Node):
     def memory(self) -> tuple[object, ...]:
         """The place, and which children were skipped."""
         return (self.index, self.catching, self.skipped)
+
+    def on_halt(self) -> None:
+        """The handler gets its one tick, unless it was under way."""
+        if self.parameters[0] and self.status == "R" and not self.catching:
+            self.run(self.children - 1)
+            self.reset_child(self.children - 1)
+        self.forget()
 
     def on_tick(self) -> str:
         """The Sequence, or the handler."""

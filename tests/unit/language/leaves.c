@@ -9,6 +9,14 @@ canopy_status_t find_goal_tick(const language_input_t *in, const find_goal_ports
     return CANOPY_SUCCESS;
 }
 
+/* Every port is a whole number of steps: 12.75 in quarters, degrees in tenths. */
+canopy_status_t scale_tick(const language_input_t *in, const scale_ports_t *ports)
+{
+    (void)in;
+    scale_set_scaled(ports, ports->gain);
+    return ports->most == 51u && ports->temperature == 105 ? CANOPY_SUCCESS : CANOPY_FAILURE;
+}
+
 canopy_status_t fill_queue_tick(const language_input_t *in, const fill_queue_ports_t *ports)
 {
     static const canopy_queue_int32_3_t queue = {.count = 3, .items = {5, 70, 900}};
@@ -16,6 +24,26 @@ canopy_status_t fill_queue_tick(const language_input_t *in, const fill_queue_por
     (void)in;
     fill_queue_set_queue(ports, &queue);
     return CANOPY_SUCCESS;
+}
+
+/* The texts that a leaf writes are constants of its own. */
+canopy_status_t choose_colour_tick(const language_input_t *in, const choose_colour_ports_t *ports)
+{
+    static const canopy_queue_text_2_t queue = {.count = 2, .items = {CHOOSE_COLOUR_LIGHT_GREEN, CHOOSE_COLOUR_RED}};
+
+    (void)in;
+    choose_colour_set_colour(ports, ports->number == 1 ? CHOOSE_COLOUR_LIGHT_GREEN : CHOOSE_COLOUR_RED);
+    if (*ports->last != (uint16_t)CHOOSE_COLOUR_RED) {
+        choose_colour_set_last(ports, CHOOSE_COLOUR_RED);
+        choose_colour_set_queue(ports, &queue);
+    }
+    return CANOPY_SUCCESS;
+}
+
+canopy_status_t say_tick(const language_input_t *in, const say_ports_t *ports)
+{
+    (void)in;
+    return ports->text[0] != '\0' ? CANOPY_SUCCESS : CANOPY_FAILURE;
 }
 
 canopy_status_t use_goal_tick(const language_input_t *in, const use_goal_ports_t *ports, use_goal_state_t *self)

@@ -44,6 +44,19 @@ def condition_writes(facts: Facts) -> Iterator[Hit]:
 
 
 @rule(
+    "unused-tree",
+    Severity.NOTE,
+    "A tree of the file that is no part of the main tree",
+    why="It is not compiled. It is checked here as a tree of its own, since editors keep such trees beside the others.",
+    way_out='Use it (<SubTree ID="…"/>), or move it into a file of its own.',
+)
+def unused_tree(facts: Facts) -> Iterator[Hit]:
+    """Of the main file: an included file may be a library."""
+    for tree_id, element in facts.tree.unused.items():
+        yield Hit(element.place, f"tree '{tree_id}' is no part of the main tree '{facts.tree.id}'")
+
+
+@rule(
     "unused-port",
     Severity.NOTE,
     "A port of a leaf that no node of the tree sets",

@@ -9,8 +9,12 @@ from canopy.check.facts import REACTIVE, SEQUENCES, Facts, label, overlap, throu
 from canopy.check.names import achieves, undoes
 from canopy.check.registry import Hit, Severity, hit, rule
 from canopy.check.status_sets import F
+from canopy.check.thresholds import of_guard, of_script
 from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.tree import Script
 from canopy.compiler.tree_reader import Node
+
+WHILE = 3  # the place of _while among the parameters of Attributes (nodes.def)
 
 
 def _cleaned_up(facts: Facts, parent: Node, opener: Leaf, failing: Node) -> bool:
@@ -97,23 +101,24 @@ def negated_guard(facts: Facts) -> Iterator[Hit]:
     why="The paper's Lemma 6: at the threshold the action starts, moves the signal across it, is halted, and so on, in "
     "every other tick (chattering).",
     way_out="Two thresholds, as in 'Battery > 20 % and not recharging'; then say so in the condition's Metadata: "
-    "`hysteresis='not recharging'`. Needs `reads` on the condition and `moves` on the action.",
+    "`hysteresis='not recharging'`. A script that asks an entry, too, is taken to have it. Needs `moves` on the "
+    "action, and `reads` on a condition that is no script.",
 )
 def no_hysteresis(facts: Facts) -> Iterator[Hit]:
-    """Conditions that a reactive node (or a WhileDoElse) asks again while the action they decide on runs."""
+    """Guards that are asked again while the action they decide on runs: under a reactive node, or as a `_while`."""
     for parent in facts.nodes:
-        if parent.type.name not in (*REACTIVE, "WhileDoElse"):
-            continue
-        for index, child in enumerate(parent.children):
-            guard = through_decorators(child)
-            if guard.leaf is None or guard.leaf.kind != "Condition" or guard.leaf.hysteresis or not guard.leaf.reads:
-                continue
-            for later in parent.children[index + 1 :]:
-                for action, leaf in facts.leaves(later):
-                    moved = next((m for m in leaf.moves if any(overlap(r, m) for r in guard.leaf.reads)), None)
-                    if moved is not None:
-                        yield hit(
-                            guard,
-                            f"{label(guard)} decides whether {label(action)} runs, which moves '{moved}': chattering",
-                        )
-                        break
+        if parent.type.name in (*REACTIVE, "WhileDoElse"):
+            for index, child in enumerate(parent.children):
+                guard = through_decorators(child)
+                for later in parent.children[index + 1 :]:
+                    yield from _chattering(facts, guard, label(guard), of_guard(guard), later)
+        elif parent.type.name == "Attributes" and isinstance(while_ := parent.parameters[WHILE], Script):
+            yield from _chattering(facts, parent, f'_while="{while_.text}"', of_script(while_), parent.children[0])
+
+
+def _chattering(facts: Facts, guard: Node, name: str, signals: tuple[str, ...], guarded: Node) -> Iterator[Hit]:
+    for action, leaf in facts.leaves(guarded) if signals else ():
+        moved = next((m for m in leaf.moves if any(overlap(signal, m) for signal in signals)), None)
+        if moved is not None:
+            yield hit(guard, f"{name} decides whether {label(action)} runs, which moves '{moved}': chattering")
+            return

@@ -12,9 +12,9 @@ from dataclasses import replace
 from fractions import Fraction
 
 from canopy.compiler.errors import nearest
+from canopy.compiler.numbers import plain
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import (
-    INT32,
     INT64,
     Const,
     Double,
@@ -27,7 +27,6 @@ from canopy.compiler.script.values import (
     describe,
     literal,
     number,
-    plain,
     result,
 )
 
@@ -69,7 +68,10 @@ class Arithmetic:
         if isinstance(value, Double):
             return value.c
         if isinstance(value, Const):
-            return repr(float(value.value))
+            try:
+                return repr(float(value.value))
+            except OverflowError:
+                raise ScriptError(index, "a number that is too large for floating point") from None
         if isinstance(value, Num):
             text = f"(double){value.c}"
             if value.scale.numerator != 1:
@@ -86,9 +88,9 @@ class Arithmetic:
             if not INT64[0] <= steps <= INT64[1]:
                 raise ScriptError(index, f"{plain(value.value)} is too large for 64 bits")
             return literal(steps, scale)
-        factor = int(value.scale / scale)
-        if factor == 1:
+        if value.scale == scale:
             return value
+        factor = int(value.scale / scale)
         low, high = sorted((value.low * factor, value.high * factor))
         if low < INT64[0] or high > INT64[1]:
             raise ScriptError(
@@ -233,7 +235,9 @@ class Arithmetic:
             ends = (one.high, two.high)
             low, high = 0, min(ends) if sign == "&" else 2 ** max(end.bit_length() for end in ends) - 1
         else:
-            low, high = INT64 if wide else INT32
+            # The fewest bits that hold both sides: C compilers warn of comparisons that these already decide.
+            bits = max((~end if end < 0 else end).bit_length() for end in (one.low, one.high, two.low, two.high))
+            low, high = -(2**bits), 2**bits - 1
         c = f"({one.as_type(wide)} {sign} {two.as_type(wide)})"
         return Num(c, "int64_t" if wide else "int32_t", low, high)
 

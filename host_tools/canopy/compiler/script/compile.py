@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
+from functools import cache
 
 from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
 from canopy.compiler.codec import value_type
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import snake
-from canopy.compiler.port_types import PortType
+from canopy.compiler.numbers import exact, plain
+from canopy.compiler.port_types import DOUBLE, FLOAT, PortType
 from canopy.compiler.script.arithmetic import Arithmetic
+from canopy.compiler.script.storing import Storing, stripped
 from canopy.compiler.script.syntax import (
     Assignment,
     Binary,
@@ -35,8 +39,6 @@ from canopy.compiler.script.values import (
     boolean,
     common_scale,
     describe,
-    number,
-    plain,
 )
 
 FAULTS = "&app->entries.script_faults"
@@ -64,9 +66,15 @@ def guess(text: str) -> Const | TextConst:
     if text.strip() in ("true", "false"):
         return Const(Fraction(text.strip() == "true"), is_bool=True)
     try:
-        return Const(Fraction(int(text, 0)) if text.strip().lower()[:2] == "0x" else Fraction(text.strip()))
-    except (ValueError, ZeroDivisionError):
+        return Const(exact(text))
+    except ValueError:
         return TextConst(text)
+
+
+@cache
+def _steps(scale: Decimal, offset: Decimal) -> tuple[Fraction, Fraction, Fraction]:
+    """A signal's scale and offset exactly, and the step of which both are multiples."""
+    return Fraction(scale), Fraction(offset), common_scale(abs(Fraction(scale)), abs(Fraction(offset)))
 
 
 class Compiler:
@@ -81,6 +89,7 @@ class Compiler:
         self._bus = bus
         self._texts = texts
         self._arithmetic = Arithmetic(floats, FAULTS, texts.index)
+        self.storing = Storing(self._arithmetic, FAULTS)
         self.used: dict[str, Message] = {}
         self.tested: set[str] = set()
         self.parts: set[str] = set()
@@ -177,8 +186,8 @@ class Compiler:
         if kind.kind == "float":
             return Double(c if kind.c == "double" else f"(double){c}")
         if kind.high > INT64[1]:
-            return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1])
-        return Num(c, kind.c, kind.low, kind.high, is_bool=kind.kind == "bool")
+            return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1], kind.scale)
+        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool")
 
     def _message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
         for message in messages:
@@ -189,7 +198,7 @@ class Compiler:
             index, f"node '{self._bus.node}' of {self._bus.path.name} does not {verb} '{name}'", nearest(name, known)
         )
 
-    def signal(self, text: str, index: int) -> Num:
+    def signal(self, text: str, index: int) -> Num | Double:
         """A received signal in physical units, or whether its message is fresh."""
         message_name, _, signal_name = text.partition(".")
         message = self._message(message_name, self._bus.receive, "receive", index)
@@ -202,6 +211,8 @@ class Compiler:
         if signal in message.multiplexed:
             self.parts.add(f"{member}.{signal.has_name}")
         c = f"{member}.{signal.c_name}"
+        if signal.is_float:
+            return self._float(Double(c if signal.c_type == "double" else f"(double){c}"), signal, index)
         if signal.is_bool:
             return Num(c, "bool", 0, 1, is_bool=True)
         low, high = signal.limits
@@ -212,16 +223,27 @@ class Compiler:
 
     def _signal(self, message: Message, name: str, index: int) -> Signal:
         for signal in message.signals:
-            if signal.name == name and signal.is_float:
-                raise ScriptError(index, f"'{message.name}.{name}' is a float, which scripts cannot use", "use a leaf")
+            if signal.name == name and signal.is_float and not self._arithmetic.floats:
+                raise ScriptError(
+                    index,
+                    f"'{message.name}.{name}' is floating point, which this application does not allow",
+                    "use a leaf, or compile with --allow-floating-point",
+                )
             if signal.name == name:
                 return signal
         known = ["fresh", *(signal.name for signal in message.signals)]
         raise ScriptError(index, f"message '{message.name}' has no signal '{name}'", nearest(name, known))
 
+    def _float(self, raw: Double, signal: Signal, index: int) -> Double:
+        """A floating-point signal in physical units."""
+        scaled = raw if signal.scale == 1 else self._arithmetic.binary("*", raw, Const(Fraction(signal.scale)), index)
+        if signal.offset != 0:
+            scaled = self._arithmetic.binary("+", scaled, Const(Fraction(signal.offset)), index)
+        assert isinstance(scaled, Double)
+        return scaled
+
     def _physical(self, raw: Num, signal: Signal, index: int) -> Num:
-        scale, offset = Fraction(signal.scale), Fraction(signal.offset)
-        step = common_scale(abs(scale), abs(offset))
+        scale, offset, step = _steps(signal.scale, signal.offset)
         value = self._arithmetic.scaled(Num(raw.c, raw.c_type, raw.low, raw.high, abs(scale)), step, index)
         if scale < 0:
             negative = self._arithmetic.unary("-", value, index)
@@ -244,54 +266,7 @@ class Compiler:
         """A comparison of values that are no expressions: a Switch's cases."""
         return self._arithmetic.compare(sign, left, right, 0)
 
-    # Storing
-
-    def parameter(self, value: Value, least: int) -> str:
-        """The C expression of a node's parameter: 32 bits, and not below `least`."""
-        if isinstance(value, Num) and value.is_bool:
-            return f"(int32_t){value.c}"
-        return self.convert(value, PortType("int", "int32_t", least, 2**31 - 1), 0)
-
-    def convert(self, value: Value, kind: PortType, index: int) -> str:
-        """The C expression that stores a value in an entry or port of a type."""
-        if kind.kind == "text":
-            if isinstance(value, (TextConst, TextVar)):
-                return self._arithmetic.text(value)
-            raise ScriptError(index, f"{describe(value)} cannot be stored as a text", "write it in '…'")
-        if isinstance(value, (TextConst, TextVar)) or kind.kind == "user":
-            raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
-        if kind.kind == "float":
-            c = self._arithmetic.double(value, index)
-            return c if kind.c == "double" else f"(float)({c})"
-        if kind.kind == "bool":
-            truth = self._arithmetic.truth(value, index)
-            return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
-        if isinstance(value, Double):
-            return f"({kind.c})canopy_whole({value.c}, {_limits(kind)}, {FAULTS})"
-        return self._whole(value, kind, index)
-
-    def _whole(self, value: Num | Const, kind: PortType, index: int) -> str:
-        if isinstance(value, Const):
-            if value.value.denominator != 1:
-                raise ScriptError(index, f"{plain(value.value)} is no whole number, and {kind} is wanted")
-            if not kind.low <= value.value <= kind.high:
-                raise ScriptError(index, f"{plain(value.value)} is outside {kind.c} [{kind.low}, {kind.high}]")
-            bits = kind.c.strip("uint_")
-            sign = "U" if kind.low == 0 else ""
-            whole = int(value.value)
-            if whole == kind.low and whole < 0:
-                return f"(INT{bits}_C({whole + 1}) - 1)"
-            return f"{sign}INT{bits}_C({whole})"
-        if value.scale.denominator != 1:
-            raise ScriptError(
-                index,
-                f"{describe(value)} would lose precision as {kind}",
-                f"multiply it by {value.scale.denominator}, and count in that unit",
-            )
-        whole_value = self._arithmetic.scaled(value, Fraction(1), index)
-        if kind.low <= whole_value.low and whole_value.high <= kind.high:
-            return whole_value.c if whole_value.c_type == kind.c else f"({kind.c}){whole_value.c}"
-        return f"({kind.c})canopy_limit({stripped(whole_value.as_type(True))}, {_limits(kind)}, {FAULTS})"
+    # Statements
 
     def statement(self, expression: Expression) -> list[str]:
         """C lines of a statement; none for one that only computes."""
@@ -308,7 +283,7 @@ class Compiler:
             )
         if target.type.kind == "any":
             raise UntypedError(target.name)
-        return self.store(target, self.convert(value, target.type, expression.value.index))
+        return self.store(target, self.storing.convert(value, target.type, expression.value.index))
 
     @staticmethod
     def store(target: Entry, c: str) -> list[str]:
@@ -334,6 +309,8 @@ class Compiler:
 
     def _raw(self, value: Value, message: Message, signal: Signal, index: int, text: str) -> str:
         """The C expression of a raw value, of the setter's type."""
+        if signal.is_float:
+            return self._raw_float(value, signal, index)
         if signal.choices:
             names = {name: raw for raw, name in signal.choices}
             enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}"
@@ -344,7 +321,7 @@ class Compiler:
             if not isinstance(value, (Num, Const)):
                 raise ScriptError(index, f"{describe(value)} is no value of '{text}'")
             wide = PortType("int", "int32_t", -(2**31), 2**31 - 1)
-            return f"({enum}_t)({self._whole(value, wide, index)})"
+            return f"({enum}_t)({self.storing.whole(value, wide, index)})"
         if signal.is_bool:
             truth = self._arithmetic.truth(value, index)
             return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
@@ -355,6 +332,14 @@ class Compiler:
                 "compute it in whole numbers",
             )
         return self._raw_number(value, signal, index, text)
+
+    def _raw_float(self, value: Value, signal: Signal, index: int) -> str:
+        raw = value
+        if signal.offset != 0:
+            raw = self._arithmetic.binary("-", raw, Const(Fraction(signal.offset)), index)
+        if signal.scale != 1:
+            raw = self._arithmetic.binary("/", raw, Const(Fraction(signal.scale)), index)
+        return self.storing.convert(raw, FLOAT if signal.c_type == "float" else DOUBLE, index)
 
     def _raw_number(self, value: Num | Const, signal: Signal, index: int, text: str) -> str:
         scale, offset = Fraction(signal.scale), Fraction(signal.offset)
@@ -375,25 +360,4 @@ class Compiler:
             )
         c_type = value_type(signal)
         low, high = {"int32_t": (-(2**31), 2**31 - 1), "int64_t": INT64, "uint64_t": (0, 2**64 - 1)}[c_type]
-        return self._whole(raw, PortType("int", c_type, low, high), index)
-
-
-def _limits(kind: PortType) -> str:
-    """The limits of a type as C names where it has such."""
-    bits = kind.c.strip("uint_")
-    low = "0" if kind.low == 0 else f"INT{bits}_MIN" if kind.low == -(2 ** (int(bits) - 1)) else number(kind.low, True)
-    if kind.high > INT64[1]:
-        return f"{low}, INT64_MAX"
-    return f"{low}, {'U' if kind.high == 2 ** int(bits) - 1 else ''}INT{bits}_MAX"
-
-
-def stripped(c: str) -> str:
-    """Without the parentheses around the whole."""
-    if not (c.startswith("(") and c.endswith(")")):
-        return c
-    depth = 0
-    for place, character in enumerate(c):
-        depth += {"(": 1, ")": -1}.get(character, 0)
-        if depth == 0 and place != len(c) - 1:
-            return c
-    return c[1:-1]
+        return self.storing.whole(raw, PortType("int", c_type, low, high), index)

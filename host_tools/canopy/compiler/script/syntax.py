@@ -23,7 +23,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from canopy.compiler.numbers import exact
+
 MAX_NESTING = 100
+MAX_CHARACTERS = 10_000  # of a script
+MAX_WORDS = 200  # of a statement: names, numbers, operators
+MAX_DIGITS = 40  # of a number, and no exponent of more than two digits
 
 ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
 COMPARISONS = ("==", "!=", "<=", ">=", "<", ">")
@@ -133,7 +138,11 @@ class _Token:
 
 def _tokens(text: str) -> list[_Token]:
     tokens = []
-    position = 0
+    position = words = 0
+    if len(text) > MAX_CHARACTERS:
+        raise ScriptError(
+            MAX_CHARACTERS, f"a script of more than {MAX_CHARACTERS} characters", "make several nodes of it"
+        )
     while not _END.match(text, position):
         match = _TOKEN.match(text, position)
         if match is None:
@@ -146,6 +155,11 @@ def _tokens(text: str) -> list[_Token]:
         index = match.start(kind)
         if kind == "number" and re.match(r"\w", text[match.end() : match.end() + 1]):
             raise ScriptError(index, f"'{word}{text[match.end()]}…' is neither a number nor a name")
+        if kind == "number" and (len(word) > MAX_DIGITS or re.search(r"^(?!0[xX]).*[eE][+-]?\d{3}", word)):
+            raise ScriptError(index, f"'{word[:12]}…' is a number that no signal or entry can hold")
+        words = 0 if word == ";" else words + 1
+        if words > MAX_WORDS:
+            raise ScriptError(index, f"a statement of more than {MAX_WORDS} words", "make several statements of it")
         tokens.append(_Token(kind, word, index))
         position = match.end()
     tokens.append(_Token("end", "", len(text)))
@@ -284,8 +298,10 @@ class _Parser:
     def _atom(self) -> Expression:
         token = self._take()
         if token.kind == "number":
-            is_hex = token.text[:2].lower() == "0x"
-            return Number(token.index, Fraction(int(token.text, 16)) if is_hex else Fraction(token.text))
+            try:
+                return Number(token.index, exact(token.text))
+            except ValueError:
+                raise ScriptError(token.index, "a number that is too long") from None
         if token.kind == "text":
             return Text(token.index, token.text[1:-1])
         if token.kind == "name":

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from math import gcd, lcm
 
+from canopy.compiler.numbers import plain
+
 INT32 = (-(2**31), 2**31 - 1)
 INT64 = (-(2**63), 2**63 - 1)
 
@@ -118,11 +120,3 @@ def describe(value: Value) -> str:
     if isinstance(value, Const):
         return f"the number {plain(value.value)}"
     return "a whole number" if value.scale.denominator == 1 else f"a number in steps of {plain(value.scale)}"
-
-
-def plain(value: Fraction) -> str:
-    """A fraction as people write it."""
-    if value.denominator == 1:
-        return str(value.numerator)
-    text = repr(float(value))
-    return text if Fraction(text) == value else f"{value.numerator}/{value.denominator}"
