@@ -27,7 +27,7 @@ _TAKEN = frozenset(_WORDS.split())
 _IMAGE_MEMBERS = ("now", "written", "saturated", "halting")
 _BUS_WORDS = ("bus", "bus_h", "codec_h", "input", "output", "rx_messages", "tx_messages", "output_signals")
 # What the application's header adds, with the same prefix.
-_APPLICATION_WORDS = ("period_us", "tree_hash")
+_APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")
 _MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")
 
 

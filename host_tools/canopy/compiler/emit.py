@@ -30,16 +30,15 @@ from canopy.compiler.leaf_c import (
     function_names,
     item_type,
     parameters,
-    place_constant,
     port_members,
     prototypes,
-    row_fields,
     setters,
     stale_test,
     text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, c_string
+from canopy.compiler.row_c import place_constant, row_fields
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table

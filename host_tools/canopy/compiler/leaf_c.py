@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
@@ -12,9 +11,6 @@ from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.names import snake
 from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType
-
-if TYPE_CHECKING:
-    from canopy.compiler.table import Row
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
 
@@ -131,29 +127,6 @@ def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
             ]
         functions.append("\n".join([*lines, "}"]))
     return functions
-
-
-def place_constant(app: str, leaf: Leaf | None) -> str:
-    """Name of the constant that is a kind's place in the table of leaves or of control nodes; None: runs scripts."""
-    if leaf is None:
-        return f"{app}_leaf_run_script".upper()
-    return f"{app}_{'control' if leaf.is_inner else 'leaf'}_{leaf.c_name}".upper()
-
-
-def row_fields(app: str, row: Row) -> list[str]:
-    """The members of a node's entry in the node table; those that its type does not use are left out."""
-    node = row.node
-    fields = [f".type = {node.type.enum}"]
-    if row.asks:
-        fields.append(f".asks = {row.asks}")
-    fields += [f".parent = {row.parent}", f".end = {row.end}"]
-    if node.type.words:
-        fields.append(f".state = {row.state}")
-    if node.leaf is not None or node.script is not None:
-        fields.append(f".leaf = {place_constant(app, node.leaf)}")
-    if node.leaf is not None or node.script is not None or node.parameters:
-        fields.append(f".parameter = {row.parameter}")
-    return fields
 
 
 def _stored(kind: PortType) -> str:

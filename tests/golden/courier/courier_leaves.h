@@ -12,6 +12,41 @@
 #ifndef CANOPY_GENERATED_COURIER_LEAVES_H
 #define CANOPY_GENERATED_COURIER_LEAVES_H
 
+/* To the linker your functions have the application's name, too: the trees of one program may have leaves of the same
+ * name, and none calls another's. Before the includes, so that a message of such a name is called the same
+ * everywhere. */
+/* NOLINTBEGIN(readability-identifier-naming): they are functions to you. */
+#define wait_for_order_on_start courier_leaf_wait_for_order_on_start
+#define wait_for_order_on_running courier_leaf_wait_for_order_on_running
+#define wait_for_order_on_halted courier_leaf_wait_for_order_on_halted
+#define take_order_tick courier_leaf_take_order_tick
+#define compute_path_on_start courier_leaf_compute_path_on_start
+#define compute_path_on_running courier_leaf_compute_path_on_running
+#define compute_path_on_halted courier_leaf_compute_path_on_halted
+#define clear_map_on_start courier_leaf_clear_map_on_start
+#define clear_map_on_running courier_leaf_clear_map_on_running
+#define clear_map_on_halted courier_leaf_clear_map_on_halted
+#define follow_path_on_start courier_leaf_follow_path_on_start
+#define follow_path_on_running courier_leaf_follow_path_on_running
+#define follow_path_on_halted courier_leaf_follow_path_on_halted
+#define order_changed_tick courier_leaf_order_changed_tick
+#define move_by_on_start courier_leaf_move_by_on_start
+#define move_by_on_running courier_leaf_move_by_on_running
+#define move_by_on_halted courier_leaf_move_by_on_halted
+#define recovery_node_enter courier_leaf_recovery_node_enter
+#define recovery_node_child courier_leaf_recovery_node_child
+#define recovery_node_halt courier_leaf_recovery_node_halt
+#define pipeline_sequence_enter courier_leaf_pipeline_sequence_enter
+#define pipeline_sequence_child courier_leaf_pipeline_sequence_child
+#define pipeline_sequence_halt courier_leaf_pipeline_sequence_halt
+#define rate_controller_enter courier_leaf_rate_controller_enter
+#define rate_controller_child courier_leaf_rate_controller_child
+#define rate_controller_halt courier_leaf_rate_controller_halt
+#define round_robin_enter courier_leaf_round_robin_enter
+#define round_robin_child courier_leaf_round_robin_child
+#define round_robin_halt courier_leaf_round_robin_halt
+/* NOLINTEND(readability-identifier-naming) */
+
 #include <stddef.h>
 
 #include "canopy/node.h"
