@@ -95,7 +95,7 @@ test-asan:
 	ctest --preset asan
 	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang" tests/integration tests/differential
 
-fuzz: ## libFuzzer on tables, states, frames and traces, FUZZ_SECONDS=60 in all
+fuzz: ## libFuzzer on tables, images, states, frames and traces, FUZZ_SECONDS=60 in all
 	$(SETUP)/ensure-packages fuzz
 	$(SETUP)/make-venv can,test
 	$(call BUILD,fuzz)

@@ -2,6 +2,7 @@
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
 #                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [TYPE_MAP "C++ type=C type"…]
 #                        [ROS_PACKAGE name=folder…]
+#                        [IMAGE_NODES nodes [IMAGE_USES uses]]
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
@@ -16,6 +17,11 @@
 #
 # The generated files, the model file for the host tools among them, are in
 # ${CMAKE_CURRENT_BINARY_DIR}/generated/NAME.
+#
+# canopy_add_image(NAME TREE tree.xml FOR application)
+#
+# Compiles another tree to an image that this application, of the same folder and with IMAGE_NODES, can load while it
+# runs (docs/image.md): generated/APPLICATION/NAME.img, made by the target NAME_image.
 include_guard(GLOBAL)
 
 include("${CMAKE_CURRENT_LIST_DIR}/Python.cmake") # CANOPY_PYTHON
@@ -29,7 +35,7 @@ file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
 set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
 
 function(canopy_add_application NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH"
+  cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -47,7 +53,7 @@ function(canopy_add_application NAME)
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
-  foreach(option INCLUDE BITRATE MAX_RAM MAX_FLASH)
+  foreach(option INCLUDE BITRATE MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
     if(APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")
@@ -77,4 +83,26 @@ function(canopy_add_application NAME)
   add_library(${NAME}_application STATIC ${sources} ${headers} ${APP_LEAVES})
   target_include_directories(${NAME}_application PUBLIC "${folder}" "${CMAKE_CURRENT_SOURCE_DIR}")
   target_link_libraries(${NAME}_application PUBLIC canopy_runtime PRIVATE canopy_warnings)
+endfunction()
+
+function(canopy_add_image NAME)
+  cmake_parse_arguments(PARSE_ARGV 1 IMAGE "" "TREE;FOR" "")
+  if(NOT IMAGE_TREE OR NOT IMAGE_FOR OR IMAGE_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "canopy_add_image(${NAME}): TREE and FOR must be given, and nothing else")
+  endif()
+  get_property(compiler GLOBAL PROPERTY CANOPY_COMPILER_SOURCES)
+  cmake_path(ABSOLUTE_PATH IMAGE_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${IMAGE_FOR}")
+  set(image "${folder}/${NAME}.img")
+  add_custom_command(
+    OUTPUT "${image}"
+    COMMAND "${CANOPY_PYTHON}" -I -m canopy image build "${IMAGE_TREE}" --for "${folder}/${IMAGE_FOR}.model.json"
+            --output "${image}" --depfile "${image}.d"
+    DEPENDS "${IMAGE_TREE}" "${folder}/${IMAGE_FOR}.model.json" ${compiler}
+    DEPFILE "${image}.d" # the files that the tree includes
+    COMMENT "canopy image ${NAME} for ${IMAGE_FOR}"
+    VERBATIM)
+  add_custom_target(${NAME}_image ALL DEPENDS "${image}")
+  # One rule makes the model file; two targets that both ran it would write it at the same time.
+  add_dependencies(${NAME}_image ${IMAGE_FOR}_application)
 endfunction()

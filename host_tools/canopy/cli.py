@@ -13,6 +13,7 @@ from canopy import __version__
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),

@@ -3,7 +3,7 @@
 
 usage: run.py BUILD_FOLDER SECONDS
 
-SECONDS are shared out; fuzz_tree, the largest, gets two thirds. Each target first runs what lies in corpus/TARGET, the
+SECONDS are shared out; fuzz_tree, the largest, gets half. Each target first runs what lies in corpus/TARGET, the
 regressions among it; then it searches on. New inputs stay in the build folder. Exit status 1 when something was found:
 the input is kept beside, and the line to run it alone is printed. Put it into corpus/TARGET, and mend what it shows.
 """
@@ -15,7 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SHARES = {"fuzz_tree": 4, "fuzz_bus": 1, "fuzz_ring": 1}
+SHARES = {"fuzz_tree": 4, "fuzz_image": 2, "fuzz_bus": 1, "fuzz_ring": 1}
 OPTIONS = ["-timeout=5", "-rss_limit_mb=1024", "-max_len=1024", "-print_final_stats=1"]
 
 

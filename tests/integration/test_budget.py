@@ -18,18 +18,23 @@ APPLICATIONS = {
     "nao_home": ("examples/nao/trees/get_home.xml", "examples/nao/nao.dbc", 50),
     "nao_power": ("examples/nao/trees/power_supply.xml", "examples/nao/nao.dbc", 50),
     "features": ("tests/unit/features/tree.xml", "tests/unit/features/features.dbc", 10),
+    "exchange": ("tests/unit/exchange/main.xml", "tests/unit/exchange/exchange.dbc", 10),
 }
-# 6 bytes of state in each of two uses of CoolDown: the compiler does not know the user's types. Padding may add 7.
-USER_STATE = {"features": 2 * 6}
+OPTIONS = {
+    "features": ["--include", str(ROOT / "tests/unit/features/state.h")],
+    "exchange": ["--include", str(ROOT / "tests/unit/exchange/state.h"), "--image-nodes", "33", "--image-uses", "5"],
+}
+# The compiler does not know the user's types: 6 bytes of state in each of two uses of CoolDown; 2 and 1 in each of five
+# that an image may have of Drive and Gate, and 8 in the entry {pose}. Padding may add 7.
+USER_STATE = {"features": 2 * 6, "exchange": 5 * (2 + 1) + 8}
 
 
 @pytest.mark.parametrize("name", APPLICATIONS)
 def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: str) -> None:
     tree, dbc, period = APPLICATIONS[name]
     arguments = [str(ROOT / tree), "--name", name, "--dbc", str(ROOT / dbc), "--node", "Controller"]
-    include = ["--include", str(ROOT / "tests/unit/features/state.h")] if name == "features" else []
     result = CliRunner().invoke(
-        main, ["compile", *arguments, "--period-ms", str(period), "-o", str(tmp_path), *include]
+        main, ["compile", *arguments, "--period-ms", str(period), "-o", str(tmp_path), *OPTIONS.get(name, [])]
     )
     assert result.exit_code == 0, result.output
     budget = re.search(r"RAM +(\d+) bytes", result.output)

@@ -61,10 +61,20 @@ def _message_struct(message: Message, *, received: bool) -> tuple[int, int]:
     return struct_size([*(scalar(s.c_type) for s in message.signals), *[scalar("bool")] * flags])
 
 
-def ram_bytes(table: Table, bus: Bus) -> int:
+@dataclass(frozen=True)
+class ImageCost:
+    """What tree images add: nodes and words at least, a member of the static object (size, alignment), and tables."""
+
+    nodes: int = 0
+    words: int = 0
+    memory: tuple[int, int] = (0, 1)
+    tables: int = 0
+
+
+def ram_bytes(table: Table, bus: Bus, images: ImageCost) -> int:
     """Size of the application's static object: the struct that the template application.c.j2 declares."""
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
-    nodes = len(table.rows)
+    nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
     bus_state = struct_size([*[pointer] * 5, *[u32] * 9])
@@ -83,15 +93,16 @@ def ram_bytes(table: Table, bus: Bus) -> int:
             image_out,
             _entries(table),
             array(rx_state, max(1, len(bus.receive))),
-            array(u16, max(1, table.words)),
+            array(u16, max(1, table.words, images.words)),
             array(u8, nodes),
             array(u8, nodes),
             array(u8, max(1, len(bus.send))),
+            images.memory,
         ]
     )[0]
 
 
-def _port(port: Port) -> tuple[int, int]:
+def port_size(port: Port) -> tuple[int, int]:
     """A port's member: a pointer for outputs, texts and types of the user's."""
     return scalar("pointer" if port.writes or port.type.kind in ("text", "user") else port.type.c)
 
@@ -113,7 +124,9 @@ def flash_bytes(table: Table, bus: Bus) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(
-        struct_size(_port(port) for port in use.leaf.ports)[0] * len(use.nodes) for use in table.users if use.leaf.ports
+        struct_size(port_size(port) for port in use.leaf.ports)[0] * len(use.nodes)
+        for use in table.users
+        if use.leaf.ports
     )
     rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
     tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)
@@ -145,11 +158,14 @@ def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -
     return round(100 * per_second / bitrate, 2)
 
 
-def make_budget(table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> Budget:
+def make_budget(
+    table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int, images: ImageCost | None = None
+) -> Budget:
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
+    images = images or ImageCost()
     return Budget(
-        ram_bytes=ram_bytes(table, bus),
-        flash_bytes=flash_bytes(table, bus),
+        ram_bytes=ram_bytes(table, bus, images),
+        flash_bytes=flash_bytes(table, bus) + images.tables,
         nodes=len(table.rows),
         worst_tick_leaf_calls=sum(len(use.nodes) for use in table.leaves),
         max_depth=max(row.depth for row in table.rows),

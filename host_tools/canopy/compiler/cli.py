@@ -14,6 +14,7 @@ import click
 from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render, write_files
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.image_room import DEFAULT_USES, MAX_NODES, MAX_USES
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs, write_stubs
@@ -79,6 +80,12 @@ def read_type_options(
     return Options(floats, result, include, folders)
 
 
+def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
+    if nodes is None and uses is not None:
+        raise CompileError(Place("--image-uses"), "needs --image-nodes", "say how many nodes an image may have")
+    return None if nodes is None else (nodes, uses or DEFAULT_USES)
+
+
 @click.command()
 @click.argument("tree", type=click.Path(path_type=Path))
 @click.option("--dbc", required=True, type=click.Path(path_type=Path), help="The bus the controller is on.")
@@ -89,6 +96,8 @@ def read_type_options(
 @type_options
 @click.option("--stubs", "stubs_file", type=click.Path(path_type=Path), help="Write skeletons of what you write.")
 @click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
+@click.option("--image-nodes", type=click.IntRange(1, MAX_NODES), help="Keep room for tree images of so many nodes.")
+@click.option("--image-uses", type=click.IntRange(1, MAX_USES), help="Of each leaf in an image; 8 if not given.")
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
 @click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=int, help="Fail when the constant tables are larger than so many bytes.")
@@ -106,6 +115,8 @@ def command(
     packages: tuple[str, ...],
     stubs_file: Path | None,
     depfile: Path | None,
+    image_nodes: int | None,
+    image_uses: int | None,
     bitrate: int,
     max_ram: int | None,
     max_flash: int | None,
@@ -123,7 +134,8 @@ def command(
     """
     try:
         options = read_type_options(include, floats, type_map, packages)
-        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options)
+        images = _images(image_nodes, image_uses)
+        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)
     except CompileError as error:
         click.echo(str(error), err=True)

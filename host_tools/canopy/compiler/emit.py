@@ -8,6 +8,7 @@ import json
 import os
 import re
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.image_catalogue import Catalogue
+from canopy.compiler.image_room import exchangeable, image_cost, make_room
 from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
@@ -57,7 +60,13 @@ class Application:
     period_ms: int
     budget: Budget
     changes_max: int
-    include: str | None
+    options: Options
+    images: Catalogue | None
+
+    @property
+    def include(self) -> str | None:
+        """The user's header."""
+        return self.options.include
 
     @property
     def health_every(self) -> int:
@@ -99,8 +108,9 @@ def load_application(
     bitrate: int,
     include: str | None = None,
     options: Options | None = None,
+    images: tuple[int, int] | None = None,
 ) -> Application:
-    """Reads and checks everything.
+    """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
 
     Raises:
         CompileError: something in the tree, in the DBC, or between them cannot be compiled.
@@ -113,8 +123,13 @@ def load_application(
     table = make_table(parsed, bind(parsed, bus, options, name))
     _check_leaves(table, bus)
     changes_max = min(CHANGES_MAX, -(-len(table.rows) // 2))
-    budget = make_budget(table, bus, period_ms, changes_max, bitrate)
-    return Application(name, table, bus, period_ms, budget, changes_max, include)
+    catalogue = None
+    if images is not None:
+        table = exchangeable(table)
+        catalogue = Catalogue(table, make_room(table, *images))
+    cost = image_cost(table, catalogue.room) if catalogue is not None else None
+    budget = make_budget(table, bus, period_ms, changes_max, bitrate, cost)
+    return Application(name, table, bus, period_ms, budget, changes_max, options, catalogue)
 
 
 def _category(row_category: str, kind: str) -> str:
@@ -163,6 +178,7 @@ def model(application: Application) -> dict[str, object]:
         },
         "trace": {name: message.id for name, message in bus.trace.items()},
         "budget": application.budget.as_dict(),
+        **({"image": application.images.model(application.options)} if application.images is not None else {}),
     }
 
 
@@ -249,6 +265,7 @@ def render(application: Application) -> dict[str, str]:
         "texts": bindings.texts,
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
+        "image": application.images,
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
     name = application.name
@@ -267,18 +284,19 @@ def render(application: Application) -> dict[str, str]:
     return files
 
 
-def write_files(folder: Path, files: dict[str, str]) -> None:
-    """Writes all files, each one whole or not at all.
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
+    """Writes all files, texts and bytes, each one whole or not at all.
 
     Raises:
         OSError: the folder cannot be made or written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
-        encoding = "cp1252" if name.endswith(".dbc") else "utf-8"
+        if isinstance(content, str):
+            content = content.encode("cp1252" if name.endswith(".dbc") else "utf-8")
         handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
         try:
-            with os.fdopen(handle, "w", encoding=encoding, newline="\n") as file:
+            with os.fdopen(handle, "wb") as file:
                 file.write(content)
             os.chmod(temporary, 0o644)
             os.replace(temporary, folder / name)

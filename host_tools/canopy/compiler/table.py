@@ -33,10 +33,17 @@ class LeafUse:
     index: int
     nodes: list[Node]
     ports: list[tuple[BoundPort, ...]] = field(default_factory=list)
+    exchangeable: bool = False
+    """An image may give it other ports."""
 
     @property
     def copies(self) -> bool:
         """Are ports copied before each call?"""
+        return (self.exchangeable and bool(self.leaf.ports)) or self.reads_entries
+
+    @property
+    def reads_entries(self) -> bool:
+        """Does the tree connect a port to what changes: an entry, a signal?"""
         return any(port.copy is not None for ports in self.ports for port in ports)
 
 

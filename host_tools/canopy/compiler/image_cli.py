@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""`canopy image`: tree images for firmware that is there already."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from canopy.compiler.emit import MODEL_FORMAT, Application, load_application, model, write_files
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
+from canopy.compiler.node_types import node_types
+from canopy.compiler.port_types import Options
+
+INPUT_ERROR = 2
+BITRATE = 500_000  # of no account for an image
+# What is read of a model file.
+FIELDS: dict[str, type] = {
+    "application": str,
+    "period_us": int,
+    "bus.dbc": str,
+    "bus.node": str,
+    "image.engine": str,
+    **{f"image.{what}": int for what in ("nodes", "uses", "parameters", "words", "texts")},
+    **{f"image.{what}": list for what in ("kinds", "scripts", "entries")},
+    "image.types.floating_point": bool,
+    "image.types.map": dict,
+}
+
+
+def _fail(text: str) -> None:
+    click.echo(text, err=True)
+    sys.exit(INPUT_ERROR)
+
+
+def _read_model(path: Path) -> dict[str, Any]:
+    """The firmware's model file. canopy.model reads it for tools that watch, and wants a trace."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CompileError(Place(str(path)), f"cannot be read: {error.strerror}", "the build writes it") from error
+    except (ValueError, RecursionError) as error:
+        raise CompileError(Place(str(path)), f"is no JSON: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != MODEL_FORMAT:
+        raise CompileError(Place(str(path)), "is no model file of this version", "build the firmware again")
+    if "image" not in data:
+        raise CompileError(
+            Place(str(path)), "this firmware takes no images", "build it with IMAGE_NODES, or --image-nodes"
+        )
+    return data
+
+
+def _field(data: dict[str, Any], path: str, kind: type, file: Path) -> Any:
+    """A value of the model file, `image.types.map` for example."""
+    value: Any = data
+    for name in path.split("."):
+        value = value.get(name) if isinstance(value, dict) else None
+    if not isinstance(value, kind):
+        raise CompileError(Place(str(file)), f"{path} is not of type {kind.__name__}", "build the firmware again")
+    return value
+
+
+def _compile(tree: Path, firmware: Path) -> tuple[Application, bytes]:
+    data = _read_model(firmware)
+    for path, kind in FIELDS.items():
+        _field(data, path, kind, firmware)
+    bus, types = data["bus"], data["image"]["types"]
+    options = Options(types["floating_point"], types["map"], types.get("include"))
+    name, period_ms = data["application"], data["period_us"] // 1000
+    dbc = firmware.parent / bus["dbc"]
+    application = load_application(name, tree, dbc, bus["node"], period_ms, BITRATE, options.include, options)
+    return application, make_image(application.table, data["image"], name)
+
+
+@click.group()
+def command() -> None:
+    """Tree images: another tree for a firmware that is there already, loaded while it runs.
+
+    \b
+    Examples:
+      canopy image build other.xml --for build/generated/robot/robot.model.json -o other.img
+      canopy image show other.img
+    """
+
+
+@command.command()
+@click.argument("tree", type=click.Path(path_type=Path))
+@click.option(
+    "--for", "firmware", required=True, type=click.Path(path_type=Path), help="The firmware's NAME.model.json."
+)
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="The image.")
+@click.option(
+    "--model", "with_model", is_flag=True, help="Write OUTPUT.model.json and the DBC, too, for the host tools."
+)
+@click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
+def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: Path | None) -> None:
+    """Compile TREE to an image for a firmware.
+
+    What the firmware would refuse is refused here, by name: leaves, scripts, entries or room that it does not have.
+    Exit status: 0 done, 2 the tree cannot be compiled for this firmware; then nothing is written.
+    """
+    try:
+        application, image = _compile(tree, firmware)
+        files: dict[str, str | bytes] = {output.name: image}
+        if with_model:
+            dbc = application.bus.path
+            files[f"{output.stem}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
+            files[dbc.name] = dbc.read_text(encoding="cp1252")
+        write_files(output.parent, files)
+        if depfile is not None:
+            read = [str(file.resolve()) for file in (*application.table.tree.files, firmware, application.bus.path)]
+            depfile.write_text(f"{output}: {' '.join(read)}\n".replace("\\", "/"))
+    except CompileError as error:
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{output}: error: cannot be written: {error.strerror}")
+    else:
+        click.echo(f"{output}: {len(image)} bytes, {len(application.table.rows)} nodes, hash {application.table.hash}")
+
+
+def _as_dict(image: Image) -> dict[str, Any]:
+    """Hashes as 16 hex digits."""
+    types = [node_type.name for node_type in node_types().values()]
+
+    def hashes(values: tuple[int, ...]) -> list[str]:
+        return [f"{value:016x}" for value in values]
+
+    return {
+        "size": image.size,
+        "crc": f"{image.crc:08x}",
+        "crc_is_right": image.crc_is_right,
+        "hash": f"{image.hash:016x}",
+        "engine": f"{image.engine:016x}",
+        "words": image.words,
+        "nodes": [
+            {
+                "type": types[node[0]] if node[0] < len(types) else node[0],
+                **dict(zip(("asks", "parent", "end", "state", "leaf", "parameter"), node[1:], strict=True)),
+            }
+            for node in image.nodes
+        ],
+        "parameters": list(image.parameters),
+        "kinds": hashes(image.kinds),
+        "scripts": hashes(image.scripts),
+        "entries": hashes(image.entries),
+        "uses": hashes(image.uses),
+        "values": [[SOURCES[s] if s < len(SOURCES) else s, value] for s, value in image.values],
+        "texts": image.texts.decode(errors="replace").split("\0")[:-1],
+    }
+
+
+@command.command()
+@click.argument("image_file", metavar="IMAGE", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print everything, as JSON.")
+def show(image_file: Path, as_json: bool) -> None:
+    """Print what an image says of itself. Exit status: 0, 1 its CRC is wrong, 2 it is no image."""
+    try:
+        image = read_image(image_file)
+    except ImageError as error:
+        _fail(f"{image_file}: error: {error}")
+    except OSError as error:
+        _fail(f"{image_file}: error: cannot be read: {error.strerror}")
+    else:
+        if as_json:
+            click.echo(json.dumps(_as_dict(image), indent=1))
+        else:
+            click.echo(f"{image_file}: {image.size} bytes, hash {image.hash:016x}, engine {image.engine:016x}")
+            click.echo(f"  CRC      {image.crc:08x} {'right' if image.crc_is_right else 'WRONG'}")
+            for what in ("nodes", "parameters", "kinds", "scripts", "entries", "uses", "values"):
+                click.echo(f"  {what:10s}{len(getattr(image, what)):6d}")
+            click.echo(f"  words     {image.words:6d}\n  texts     {len(image.texts):6d} bytes")
+        sys.exit(0 if image.crc_is_right else 1)
