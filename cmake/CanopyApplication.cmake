@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
-#                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [TYPE_MAP "C++ type=C type"…]
-#                        [ROS_PACKAGE name=folder…]
+#                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
+#                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
 #
@@ -35,7 +35,8 @@ file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
 set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
 
 function(canopy_add_application NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT" "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
+  cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
+                        "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -62,6 +63,9 @@ function(canopy_add_application NAME)
   endforeach()
   if(APP_ALLOW_FLOATING_POINT)
     list(APPEND options --allow-floating-point)
+  endif()
+  if(APP_ALLOW_UNSET_PORTS)
+    list(APPEND options --allow-unset-ports)
   endif()
   foreach(pair IN LISTS APP_TYPE_MAP)
     list(APPEND options --type-map "${pair}")

@@ -178,7 +178,6 @@ SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
          ["the last child of <TryCatch> must be a leaf", "do the clean-up in one leaf"]),
         ("<TryCatch catch_on_halt='{n}'><AlwaysSuccess/><Go speed='1' _skipIf='true'/></TryCatch>", "", "3:47", ["must be a leaf of yours or a Script"]),
         ("<TryCatch catch_on_halt='perhaps'><AlwaysSuccess/><Go speed='1'/></TryCatch>", "", "3:1", ["'perhaps' is not a whole number"]),
-        ("<Choose colour='{c}'/>", "", "13:21", ["port 'colour' of 'Choose': texts are constants, and nothing says which", '<Metadata texts="red;green"/>']),
         ("<Sequence><Name it='{x}'/><LoopInt queue='{x}' value='{v}'><AlwaysSuccess/></LoopInt></Sequence>", "", "3:43",
          ["entry 'x' is canopy_queue_text_3_t, and a queue of int32_t is needed"]),
         ("<Sequence><Find goal='{q}'/><LoopString queue='{q}' value='{v}'><AlwaysSuccess/></LoopString></Sequence>", "", "3:48",

@@ -258,6 +258,37 @@ def test_texts_of_a_leaf_need_names_of_their_own(tmp_path: Path) -> None:
         assert "gives no C name of its own" in result.stderr
 
 
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_unset_ports_are_zero_where_that_is_allowed(tmp_path: Path, compiler: str) -> None:
+    ports = {"count": "uint8_t", "on": "bool", "name": "string", "limit": "int16_t*0.1", "pose": "pose_t"}
+    inputs = "".join(f"<input_port name='{name}' type='{kind}'/>" for name, kind in ports.items())
+    model = f"<Condition ID='Is'>{inputs}</Condition>"
+    files = {"main.xml": tree("<Is/>", model=model)}
+    (tmp_path / "mine.h").write_text("typedef struct { int x; } pose_t;\n")
+    refused = compile_files(tmp_path, files, "--include", "mine.h")
+    assert refused.exit_code == 2
+    assert "'Is' needs a value for its port 'count'" in refused.stderr
+    assert "--allow-unset-ports" in refused.stderr
+    assert compile_files(tmp_path, files, "--include", "mine.h", "--allow-unset-ports").exit_code == 0
+    code = (tmp_path / "out" / "main_app.c").read_text()
+    for member in (".count = 0", ".on = false", ".name = NULL", ".limit = 0", ".pose = NULL"):
+        assert member in code
+    include = ["-I", str(ROOT / "runtime" / "include"), "-I", str(tmp_path / "out"), "-I", str(tmp_path)]
+    source = str(tmp_path / "out" / "main_app.c")
+    subprocess.run([compiler, "-std=c11", *WARNINGS, *include, "-c", source, "-o", "/dev/null"], check=True)
+
+
+def test_a_leaf_that_lists_no_texts_writes_places_in_the_table(tmp_path: Path) -> None:
+    model = "<Action ID='See'><output_port name='what' type='string'/></Action>"
+    model += "<Action ID='Tell'><input_port name='what' type='string'/></Action>"
+    nodes = "<Sequence><See what='{x}'/><Tell what='{x}'/></Sequence>"
+    assert compile_files(tmp_path, {"main.xml": tree(nodes, model=model)}).exit_code == 0
+    assert "void see_set_what(const see_ports_t *ports, uint16_t value)" in (tmp_path / "out/main_leaves.h").read_text()
+    # Whatever number it writes, nothing outside the table is read.
+    guard = "main_texts[app->entries.x < MAIN_TEXTS ? app->entries.x : 0u]"
+    assert guard in (tmp_path / "out" / "main_app.c").read_text()
+
+
 @pytest.mark.parametrize("item", ["std::chrono::milliseconds", "pose_t"])
 def test_queues_hold_numbers_and_texts(tmp_path: Path, item: str) -> None:
     model = f"<Action ID='A'><output_port name='p' type='{item}[4]'/></Action>"

@@ -61,6 +61,7 @@ def command(
     period_ms: int,
     include: str | None,
     floats: bool,
+    unset_ports: bool,
     type_map: tuple[str, ...],
     packages: tuple[str, ...],
     severity: str,
@@ -89,7 +90,7 @@ def command(
     rules = _wanted(disable, Severity[severity.upper()])
     bus = BusOptions(dbc, node, period_ms) if dbc is not None and node is not None else None
     try:
-        types = read_type_options(include, floats, type_map, packages)
+        types = read_type_options(include, floats, unset_ports, type_map, packages)
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)

@@ -288,18 +288,12 @@ class _Binder:
         where = f"port '{port.name}' of '{node.leaf.id}'"
         if port.type.kind == "any":
             raise CompileError(bound.place, f"{where}: nothing gives it a type", f"declare it, at {port.place}")
-        if port.writes and port.type.holds_texts and not node.leaf.texts:
-            raise CompileError(
-                port.place,
-                f"{where}: texts are constants, and nothing says which ones it may write",
-                f"list them in the model of '{node.leaf.id}': <Metadata texts=\"red;green\"/>",
-            )
         if isinstance(bound.target, Entry):
             return self._connected(node.leaf, bound, bound.target, where, bindings)
         if isinstance(bound.target, SignalName):
             return self._signal(bound, bound.target, where)
-        if bound.text is None:
-            return BoundPort("NULL")
+        if bound.text is None:  # nothing is connected
+            return BoundPort("NULL" if port.writes or port.type.kind == "user" else _zero(port.type))
         return BoundPort(_constant(bound.text, port.type, where, bound.place))
 
     def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
@@ -333,7 +327,9 @@ class _Binder:
         if port.type.kind == "user":
             return BoundPort(f"&memory.entries.{entry.c_name}")
         if port.type.kind == "text":
-            return BoundPort("NULL", f"{self._name}_texts[app->entries.{entry.c_name}]")
+            place, texts = f"app->entries.{entry.c_name}", f"{self._name}_texts"
+            # A leaf may have written any number.
+            return BoundPort("NULL", f"{texts}[{place} < {texts.upper()} ? {place} : 0u]")
         return BoundPort(_zero(port.type), f"app->entries.{entry.c_name}")
 
 

@@ -47,6 +47,12 @@ def type_options(command: _Command) -> _Command:
         ),
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
+            "--allow-unset-ports",
+            "unset_ports",
+            is_flag=True,
+            help="Let input ports have neither a value nor a default: they are 0, false or NULL.",
+        ),
+        click.option(
             "--allow-floating-point", "floats", is_flag=True, help="Let ports and scripts use float and double."
         ),
         click.option(
@@ -58,7 +64,7 @@ def type_options(command: _Command) -> _Command:
 
 
 def read_type_options(
-    include: str | None, floats: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
+    include: str | None, floats: bool, unset_ports: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
 ) -> Options:
     """What `type_options` were given.
 
@@ -77,7 +83,7 @@ def read_type_options(
         if not found or not name or not folder:
             raise CompileError(Place("--ros-package"), f"'{pair}' is not NAME=DIR", "for example my_trees=src/my_trees")
         folders[name] = Path(folder)
-    return Options(floats, result, include, folders)
+    return Options(floats, result, include, folders, unset_ports)
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
@@ -111,6 +117,7 @@ def command(
     name: str | None,
     include: str | None,
     floats: bool,
+    unset_ports: bool,
     type_map: tuple[str, ...],
     packages: tuple[str, ...],
     stubs_file: Path | None,
@@ -133,7 +140,7 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        options = read_type_options(include, floats, type_map, packages)
+        options = read_type_options(include, floats, unset_ports, type_map, packages)
         images = _images(image_nodes, image_uses)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)

@@ -206,7 +206,7 @@ class _Writer:
                 )
             return FROM_ENTRY, self._entries[id(target)]
         if target is None:
-            return FROM_NOTHING, 0
+            return FROM_NOTHING if port.writes else FROM_CONSTANT, 0
         assert isinstance(target, str)
         if port.type.kind == "text":
             return FROM_TEXT, self._texts.place(target)

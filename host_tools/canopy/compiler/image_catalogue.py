@@ -108,6 +108,7 @@ class Catalogue:
             ],
             "types": {
                 "floating_point": options.floats,
+                "unset_ports": options.unset_ports,
                 "map": options.type_map,
                 "include": options.include,
             },

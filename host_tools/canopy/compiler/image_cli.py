@@ -28,6 +28,7 @@ FIELDS: dict[str, type] = {
     **{f"image.{what}": int for what in ("nodes", "uses", "parameters", "words", "texts")},
     **{f"image.{what}": list for what in ("kinds", "scripts", "entries")},
     "image.types.floating_point": bool,
+    "image.types.unset_ports": bool,
     "image.types.map": dict,
 }
 
@@ -69,7 +70,7 @@ def _compile(tree: Path, firmware: Path) -> tuple[Application, bytes]:
     for path, kind in FIELDS.items():
         _field(data, path, kind, firmware)
     bus, types = data["bus"], data["image"]["types"]
-    options = Options(types["floating_point"], types["map"], types.get("include"))
+    options = Options(types["floating_point"], types["map"], types.get("include"), unset_ports=types["unset_ports"])
     name, period_ms = data["application"], data["period_us"] // 1000
     dbc = firmware.parent / bus["dbc"]
     application = load_application(name, tree, dbc, bus["node"], period_ms, BITRATE, options.include, options)

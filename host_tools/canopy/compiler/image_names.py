@@ -69,13 +69,15 @@ def target_of(bound: Bound) -> Entry | SignalName | str | None:
 
 
 def is_fixed(port: Port, bound: Bound) -> bool:
-    """Only firmware can connect this: signals, texts that change, constants of the user's own types."""
+    """Only firmware can connect this: signals, texts that change, constants of the user's own types, and a NULL."""
     target = target_of(bound)
+    if target is None:
+        return not port.writes and port.type.kind in ("text", "user")
     if isinstance(target, SignalName):
         return True
     if isinstance(target, Entry):
         return port.type.kind == "text" and not port.writes
-    return target is not None and port.type.kind == "user"
+    return port.type.kind == "user"
 
 
 def base_signature(table: Table, use_index: int, node_index: int) -> str:

@@ -109,7 +109,7 @@ class Leaf:
     @property
     def text_type(self) -> str:
         """The C enum of the texts that it may write."""
-        return f"{self.c_name}_text_t"
+        return f"{self.c_name}_text_t" if self.texts else "uint16_t"
 
     @property
     def is_inner(self) -> bool:

@@ -87,10 +87,12 @@ PORT_TYPES: dict[str, PortType] = {
     "float32": FLOAT,
     "float64": DOUBLE,
     "std::string": TEXT,
+    "string": TEXT,
     "std::string_view": TEXT,
     "const char *": TEXT,
     "std::basic_string<char,std::char_traits<char>,std::allocator<char>>": TEXT,
     "std::chrono::milliseconds": DURATION,
+    "chrono::milliseconds": DURATION,
     "std::chrono::duration<long,std::ratio<1,1000>>": DURATION,
     "duration": DURATION,
     "": ANY,
@@ -108,11 +110,12 @@ class Options:
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
     ros_packages: dict[str, Path] = field(default_factory=dict)
+    unset_ports: bool = False  # input ports may have neither a value nor a default: 0, false or NULL
     any_type: bool = False  # types for which there is nothing in C are accepted
 
 
 # For tools that make no C.
-ANY_TYPE = Options(floats=True, any_type=True)
+ANY_TYPE = Options(floats=True, unset_ports=True, any_type=True)
 
 
 def _normal(name: str) -> str:

@@ -266,12 +266,13 @@ class _Builder:
         text = element.attributes[port.name] if given else port.default
         place = element.attribute_place(port.name) if given else element.place
         if text is None:
-            if port.direction == "out":
+            if port.direction == "out" or self.context.options.unset_ports:
                 return Bound(port, place)
             raise CompileError(
                 element.place,
                 f"'{leaf.id}' needs a value for its port '{port.name}'",
-                f"or give the port a default where it is declared: {port.place}",
+                f"or give the port a default where it is declared: {port.place}; or take 0, false or NULL for all such "
+                "ports: --allow-unset-ports",
             )
         name = pointer(text, port.name)
         if name is None:

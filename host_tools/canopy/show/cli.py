@@ -41,6 +41,7 @@ def command(
     dot_file: str | None,
     include: str | None,
     floats: bool,
+    unset_ports: bool,
     type_map: tuple[str, ...],
     packages: tuple[str, ...],
 ) -> None:
@@ -56,8 +57,8 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        options = read_type_options(include, floats, type_map, packages)
-        checked = read_tree(tree, replace(options, floats=True, any_type=True))
+        options = read_type_options(include, floats, unset_ports, type_map, packages)
+        checked = read_tree(tree, replace(options, floats=True, unset_ports=True, any_type=True))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)

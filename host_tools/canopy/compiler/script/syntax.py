@@ -28,7 +28,6 @@ from canopy.compiler.numbers import exact
 MAX_NESTING = 100
 MAX_CHARACTERS = 10_000  # of a script
 MAX_WORDS = 200  # of a statement: names, numbers, operators
-MAX_DIGITS = 40  # of a number, and no exponent of more than two digits
 
 ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
 COMPARISONS = ("==", "!=", "<=", ">=", "<", ">")
@@ -155,8 +154,6 @@ def _tokens(text: str) -> list[_Token]:
         index = match.start(kind)
         if kind == "number" and re.match(r"\w", text[match.end() : match.end() + 1]):
             raise ScriptError(index, f"'{word}{text[match.end()]}…' is neither a number nor a name")
-        if kind == "number" and (len(word) > MAX_DIGITS or re.search(r"^(?!0[xX]).*[eE][+-]?\d{3}", word)):
-            raise ScriptError(index, f"'{word[:12]}…' is a number that no signal or entry can hold")
         words = 0 if word == ";" else words + 1
         if words > MAX_WORDS:
             raise ScriptError(index, f"a statement of more than {MAX_WORDS} words", "make several statements of it")
