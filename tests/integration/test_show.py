@@ -170,6 +170,6 @@ def test_a_tree_with_types_of_the_users_own() -> None:
     assert "TryCatch [catch_on_halt]" in shown
     assert "[TestNode return_status=3 async_delay=0 failure_script=stand_in = 2 post_script=posts += 1]" in shown
     floating = REPOSITORY / "tests" / "unit" / "floating" / "main.xml"
-    assert "[Measure]" in show(floating, "--allow-floating-point")
-    wrong = CliRunner().invoke(main, ["show", str(floating), "--type-map", "x"])
-    assert (wrong.exit_code, "'x' is not CXX=C" in wrong.output) == (2, True)
+    assert "[Measure]" in show(floating)
+    wrong = CliRunner().invoke(main, ["show", str(floating), "--ros-package", "x"])
+    assert (wrong.exit_code, "'x' is not NAME=DIR" in wrong.output) == (2, True)

@@ -39,12 +39,15 @@ def _not_written(error: OSError, output: Path) -> CompileError:
     return CompileError(Place(str(error.filename or output)), f"cannot be written: {error.strerror}")
 
 
+package_option = click.option(
+    "--ros-package", "packages", multiple=True, metavar="NAME=DIR", help="Folder of an <include ros_pkg>."
+)
+
+
 def type_options(command: _Command) -> _Command:
-    """The options about types and includes, of every command that reads trees."""
+    """The options about types and includes, of the commands that look into ports and scripts."""
     for option in (
-        click.option(
-            "--ros-package", "packages", multiple=True, metavar="NAME=DIR", help="Folder of an <include ros_pkg>."
-        ),
+        package_option,
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
             "--allow-unset-ports",
@@ -63,6 +66,21 @@ def type_options(command: _Command) -> _Command:
     return command
 
 
+def read_packages(packages: tuple[str, ...]) -> dict[str, Path]:
+    """What `package_option` was given.
+
+    Raises:
+        CompileError: one is malformed.
+    """
+    folders = {}
+    for pair in packages:
+        name, found, folder = pair.partition("=")
+        if not found or not name or not folder:
+            raise CompileError(Place("--ros-package"), f"'{pair}' is not NAME=DIR", "for example my_trees=src/my_trees")
+        folders[name] = Path(folder)
+    return folders
+
+
 def read_type_options(
     include: str | None, floats: bool, unset_ports: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
 ) -> Options:
@@ -77,13 +95,7 @@ def read_type_options(
         if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
-    folders = {}
-    for pair in packages:
-        name, found, folder = pair.partition("=")
-        if not found or not name or not folder:
-            raise CompileError(Place("--ros-package"), f"'{pair}' is not NAME=DIR", "for example my_trees=src/my_trees")
-        folders[name] = Path(folder)
-    return Options(floats, result, include, folders, unset_ports)
+    return Options(floats, result, include, read_packages(packages), unset_ports)
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:

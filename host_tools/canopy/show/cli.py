@@ -9,8 +9,9 @@ from pathlib import Path
 
 import click
 
-from canopy.compiler.cli import read_type_options, type_options
+from canopy.compiler.cli import package_option, read_packages
 from canopy.compiler.errors import CompileError
+from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
 from canopy.show.dot import dot
 from canopy.show.svg import svg
@@ -34,15 +35,11 @@ def _write(target: str, text: str) -> None:
 @click.argument("tree", type=click.Path(path_type=Path))
 @click.option("--svg", "svg_file", metavar="FILE", help="Draw it as SVG into FILE; - is standard output.")
 @click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
-@type_options
+@package_option
 def command(
     tree: Path,
     svg_file: str | None,
     dot_file: str | None,
-    include: str | None,
-    floats: bool,
-    unset_ports: bool,
-    type_map: tuple[str, ...],
     packages: tuple[str, ...],
 ) -> None:
     """Draw TREE: in the terminal, as SVG, or as DOT.
@@ -57,8 +54,7 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        options = read_type_options(include, floats, unset_ports, type_map, packages)
-        checked = read_tree(tree, replace(options, floats=True, unset_ports=True, any_type=True))
+        checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages)))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
