@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -49,3 +50,18 @@ def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: 
     memory = re.search(r"^\d+ (\d+) b memory$", symbols, re.MULTILINE)
     assert memory is not None, symbols
     assert int(memory[1]) - USER_STATE.get(name, 0) == pytest.approx(int(budget[1]), abs=7)
+
+
+def test_each_kind_of_node_has_a_price(tmp_path: Path) -> None:
+    tree, dbc, period = APPLICATIONS["features"]
+    arguments = ["compile", str(ROOT / tree), "--name", "features", "--dbc", str(ROOT / dbc), "--node", "Controller"]
+    arguments += ["--period-ms", str(period), "-o", str(tmp_path), "--include", "state.h"]
+    budget = json.loads(CliRunner().invoke(main, [*arguments, "--json"]).output)
+    assert sum(cost["nodes"] for cost in budget["kinds"]) == budget["nodes"]
+    timeout = next(cost for cost in budget["kinds"] if cost["kind"] == "Timeout")
+    assert (timeout["ram_each"], timeout["flash_each"]) == (2 + 4 * 2, 12)  # a deadline of 64 bits
+    totals = [cost["nodes"] * cost["flash_each"] for cost in budget["kinds"]]
+    assert totals == sorted(totals, reverse=True)
+    assert sum(totals) < budget["flash_bytes"]
+    printed = CliRunner().invoke(main, [*arguments, "--costs"]).output
+    assert re.search(r"^  Timeout +\d+ +10 +12$", printed, re.MULTILINE)

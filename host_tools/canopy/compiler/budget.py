@@ -7,16 +7,21 @@ are not known here, and code is not counted: the CMake target `sizes` measures w
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 from canopy.compiler.bus_reader import Bus, Message
 from canopy.compiler.leaf_c import entry_type, item_type
-from canopy.compiler.leaf_model import Port
+from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.table import Table
+from canopy.compiler.tree import Node
 
 # (size, alignment) on a 32-bit target with 8-byte alignment of 64-bit integers: Arm EABI and RISC-V ILP32.
 SIZES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
+NODE_FLASH = 12  # sizeof(canopy_node_t)
+NODE_RAM = 2  # its status, and the one that the trace sent last
+WORD_RAM = 2
 SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
 
 
@@ -40,8 +45,18 @@ def array(element: tuple[int, int], count: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
+class KindCost:
+    """What the nodes of one kind cost: so many, and [bytes] of RAM and of constant tables each."""
+
+    kind: str
+    nodes: int
+    ram_each: int
+    flash_each: int
+
+
+@dataclass(frozen=True)
 class Budget:
-    """The figures that are printed and written to the model file."""
+    """The figures that are printed and written to the model file. `kinds`: the dearest in flash first."""
 
     ram_bytes: int
     flash_bytes: int
@@ -50,8 +65,9 @@ class Budget:
     max_depth: int
     can_load_percent: float
     bitrate: int
+    kinds: tuple[KindCost, ...]
 
-    def as_dict(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, object]:
         """For the model file."""
         return asdict(self)
 
@@ -120,17 +136,37 @@ def _entries(table: Table) -> tuple[int, int]:
     return struct_size([*members, scalar("uint32_t")]) if members or table.scripts else (0, 1)
 
 
+def _ports_size(leaf: Leaf) -> int:
+    return struct_size(port_size(port) for port in leaf.ports)[0] if leaf.ports else 0
+
+
+def kind_costs(table: Table) -> tuple[KindCost, ...]:
+    """What each kind of node costs. Parameters, scripts and functions are shared, and not counted here."""
+    first: dict[str, Node] = {}
+    count: Counter[str] = Counter()
+    for row in table.rows:
+        kind = row.node.xml_name or row.node.type.name
+        first.setdefault(kind, row.node)
+        count[kind] += 1
+    costs = [
+        KindCost(
+            kind,
+            count[kind],
+            NODE_RAM + WORD_RAM * node.type.words,
+            NODE_FLASH + (_ports_size(node.leaf) if node.leaf is not None else 0),
+        )
+        for kind, node in first.items()
+    ]
+    return tuple(sorted(costs, key=lambda cost: (-cost.nodes * cost.flash_each, cost.kind)))
+
+
 def flash_bytes(table: Table, bus: Bus) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
-    ports = sum(
-        struct_size(port_size(port) for port in use.leaf.ports)[0] * len(use.nodes)
-        for use in table.users
-        if use.leaf.ports
-    )
+    ports = sum(_ports_size(use.leaf) * len(use.nodes) for use in table.users)
     rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
     tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)
-    tables = 12 * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
+    tables = NODE_FLASH * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
     numbers = 4 * (len(table.parameters) + len(table.scripts) + len(table.bindings.texts))
     return tables + numbers + ports + rx + tx
 
@@ -171,4 +207,5 @@ def make_budget(
         max_depth=max(row.depth for row in table.rows),
         can_load_percent=can_load_percent(bus, period_ms, changes_max, bitrate),
         bitrate=bitrate,
+        kinds=kind_costs(table),
     )

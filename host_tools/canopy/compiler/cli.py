@@ -24,6 +24,13 @@ INPUT_ERROR = 2
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
 
+def _print_costs(budget: Budget) -> None:
+    width = max(len(cost.kind) for cost in budget.kinds)
+    click.echo(f"  {'kind of node':{max(width, 12)}}  nodes  RAM each  flash each")
+    for cost in budget.kinds:
+        click.echo(f"  {cost.kind:{max(width, 12)}} {cost.nodes:6d} {cost.ram_each:9d} {cost.flash_each:11d}")
+
+
 def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int | None) -> None:
     def limit(value: int | None) -> str:
         return f" of {value}" if value is not None else ""
@@ -119,6 +126,7 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
 @click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
 @click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=int, help="Fail when the constant tables are larger than so many bytes.")
+@click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the budget as JSON.")
 def command(
     tree: Path,
@@ -139,6 +147,7 @@ def command(
     bitrate: int,
     max_ram: int | None,
     max_flash: int | None,
+    costs: bool,
     as_json: bool,
 ) -> None:
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
@@ -183,3 +192,5 @@ def command(
         click.echo(json.dumps(budget.as_dict()))
     else:
         _print_budget(application.name, budget, max_ram, max_flash)
+        if costs:
+            _print_costs(budget)
