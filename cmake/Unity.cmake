@@ -19,9 +19,10 @@ function(canopy_fetch_unity OUT)
     file(LOCK "${archive}.lock" GUARD FUNCTION TIMEOUT 300)
     if(NOT EXISTS "${archive}")
         message(STATUS "Fetching Unity (${CANOPY_UNITY_PACKAGE}) with pip")
+        # Not `--no-binary :all:`: pip would build the package's build system, and what that is built with, from source.
         execute_process(
-            COMMAND "${CANOPY_PYTHON}" -m pip download --quiet --disable-pip-version-check --no-deps --no-binary :all:
-                    --dest "${CANOPY_DOWNLOAD_DIR}" "${CANOPY_UNITY_PACKAGE}"
+            COMMAND "${CANOPY_PYTHON}" -m pip download --quiet --disable-pip-version-check --no-deps
+                    --no-binary pytest-unity --dest "${CANOPY_DOWNLOAD_DIR}" "${CANOPY_UNITY_PACKAGE}"
             RESULT_VARIABLE result ERROR_VARIABLE errors)
         if(NOT result EQUAL 0)
             message(FATAL_ERROR "Unity could not be fetched with pip:\n${errors}\n${help}")
