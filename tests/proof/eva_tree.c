@@ -16,7 +16,15 @@
 #include "canopy/node.h"
 #include "canopy/tree.h"
 
-enum { MOST = 3, NODES = 10, WORDS = 16, PARAMETERS = 16, ANY_SCRIPT = 0 };
+/* A control node of your own can go on with any child: two of them already make many states. */
+enum { MOST = ROOT == CANOPY_NODE_USER_CONTROL ? 2 : 3, NODES = 10, WORDS = 16, PARAMETERS = 16, ANY_SCRIPT = 0 };
+
+/* One that keeps its place and one that keeps a time; -DALL: every type, which takes hours. */
+#ifdef ALL
+#define IS_INNER(type) true
+#else
+#define IS_INNER(type) ((type) == CANOPY_NODE_SEQUENCE || (type) == CANOPY_NODE_TIMEOUT)
+#endif
 
 typedef struct {
     uint8_t least;
@@ -34,27 +42,33 @@ static const shape_t shapes[CANOPY_NODE_TYPES] = {
 
 static canopy_tree_instance_t instance;
 static canopy_tree_t tree;
+static uint8_t any_idle; /* Any code of a node that is IDLE. */
 static uint8_t ticked[NODES];
 static canopy_status_t acts[NODES]; /* What a StatefulAction knows of itself. */
 
 /* --- leaves, scripts and control nodes; a leaf's parameter is its node ------------------------------------------- */
 
-/** Not `any value`: a status each, and all that are none, so that EVA looks at each by itself. */
-static canopy_status_t any_status(void)
+/** Each by itself, so that EVA keeps them apart. */
+static canopy_status_t any_result(void)
 {
-    switch (Frama_C_interval(0, 4)) {
+    switch (Frama_C_interval(0, 3)) {
     case 0:
         return CANOPY_RUNNING;
     case 1:
         return CANOPY_SUCCESS;
     case 2:
         return CANOPY_FAILURE;
-    case 3:
-        return CANOPY_SKIPPED;
     default:
-        return Frama_C_interval(0, 1) != 0 ? CANOPY_IDLE
-                                           : (canopy_status_t)Frama_C_unsigned_int_interval(5, UINT32_MAX);
+        return CANOPY_SKIPPED;
     }
+}
+
+static canopy_status_t any_status(void)
+{
+    if (Frama_C_interval(0, 1) != 0) {
+        return any_result();
+    }
+    return Frama_C_interval(0, 1) != 0 ? CANOPY_IDLE : (canopy_status_t)Frama_C_unsigned_int_interval(5, UINT32_MAX);
 }
 
 static canopy_status_t leaf(void *application, uint16_t node)
@@ -96,19 +110,18 @@ static int32_t any_script(void *application)
     return Frama_C_interval(INT32_MIN, INT32_MAX);
 }
 
+/** Each node of the tree, each status, and what is neither. */
 static uint32_t any_step(void)
 {
-    for (uint32_t step = 0; step < (uint32_t)NODES; step++) {
+    for (uint32_t step = 0; step < tree.node_count; step++) {
         if (Frama_C_interval(0, 1) != 0) {
             return step;
         }
     }
-    for (uint32_t status = 0; status <= (uint32_t)CANOPY_SKIPPED; status++) {
-        if (Frama_C_interval(0, 1) != 0) {
-            return CANOPY_STEP_DONE + status;
-        }
+    if (Frama_C_interval(0, 1) != 0) {
+        return CANOPY_STEP_DONE + (uint32_t)any_result();
     }
-    return Frama_C_interval(0, 1) != 0 ? Frama_C_unsigned_int_interval(NODES, CANOPY_STEP_DONE - 1u)
+    return Frama_C_interval(0, 1) != 0 ? Frama_C_unsigned_int_interval(tree.node_count, CANOPY_STEP_DONE)
                                        : Frama_C_unsigned_int_interval(CANOPY_STEP_DONE + 5u, UINT32_MAX);
 }
 
@@ -163,8 +176,7 @@ static void add(canopy_node_t *nodes, int32_t *parameters, uint8_t type, uint16_
         parameters[tree.parameter_count++] = (int32_t)ANY_SCRIPT;
     }
     if (type == (uint8_t)CANOPY_NODE_PRECONDITION || type == (uint8_t)CANOPY_NODE_LOOP) {
-        parameters[tree.parameter_count - 1u] = Frama_C_interval(CANOPY_RUNNING, CANOPY_SKIPPED);
-        /*@ split parameters[tree.parameter_count - 1]; */
+        parameters[tree.parameter_count - 1u] = (int32_t)any_result();
     } else if (type < (uint8_t)CANOPY_NODE_PRECONDITION || type > (uint8_t)CANOPY_NODE_SWITCH) {
         nodes[node].asks = (uint8_t)((1u << shapes[type].parameters) - 1u);
     }
@@ -178,13 +190,17 @@ static void add_leaf(canopy_node_t *nodes, int32_t *parameters, uint16_t parent,
     nodes[node].end = tree.node_count;
 }
 
-static void build(canopy_node_t *nodes, int32_t *parameters, uint8_t inner, unsigned children, unsigned place,
-                  unsigned turn)
+static void build(canopy_node_t *nodes, int32_t *parameters, uint8_t inner, unsigned children)
 {
+    unsigned place = children > 0u ? inner % children : 0u;
+    unsigned turn = inner / 2u;
+
     add(nodes, parameters, ROOT, 0);
     for (unsigned child = 0; child < children; child++) {
         uint16_t top = tree.node_count;
-        unsigned below = shapes[inner].least > 2u ? shapes[inner].least : shapes[inner].most < 2u ? shapes[inner].most : 2u;
+        unsigned below = shapes[inner].least > 2u  ? shapes[inner].least
+                         : shapes[inner].most < 2u ? shapes[inner].most
+                                                   : 2u;
 
         if (child != place) {
             add_leaf(nodes, parameters, 0, turn + child);
@@ -201,18 +217,42 @@ static void build(canopy_node_t *nodes, int32_t *parameters, uint8_t inner, unsi
 
 /* --- the run ------------------------------------------------------------------------------------------------------- */
 
-/** Words that are no child's index and no count of children: any value. */
-static void any_numbers(const canopy_node_t *nodes, uint16_t *words)
+/** What the engine does not rely on any more may be anything. @return from which word on nothing is relied on */
+static uint8_t words_in_use(uint8_t type, bool running)
+{
+    switch ((canopy_node_type_t)type) {
+    case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
+    case CANOPY_NODE_RUN_ONCE:
+        return 1;
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_ASYNC_SEQUENCE:
+    case CANOPY_NODE_ASYNC_FALLBACK:
+    case CANOPY_NODE_IF_THEN_ELSE:
+    case CANOPY_NODE_TRY_CATCH:
+    case CANOPY_NODE_SWITCH:
+        return running ? 1 : 0;
+    case CANOPY_NODE_PARALLEL:
+        return running ? 4 : 0;
+    default:
+        return 0;
+    }
+}
+
+/** Makes the state more general than it is, so that there are fewer states. */
+static void forget(const canopy_node_t *nodes, uint8_t *status, uint16_t *words)
 {
     for (uint16_t node = 0; node < tree.node_count; node++) {
         uint8_t type = nodes[node].type;
 
-        if (type == (uint8_t)CANOPY_NODE_SLEEP || (type >= (uint8_t)CANOPY_NODE_REPEAT && type <= (uint8_t)CANOPY_NODE_TIMEOUT) ||
-            (type >= (uint8_t)CANOPY_NODE_SKIP_UNLESS_UPDATED && type <= (uint8_t)CANOPY_NODE_WAS_ENTRY_UPDATED)) {
-            for (uint8_t word = 0; word < shapes[type].words; word++) {
-                words[nodes[node].state + word] = (uint16_t)Frama_C_unsigned_int_interval(0, UINT16_MAX);
-            }
+        for (uint8_t word = words_in_use(type, status[node] == (uint8_t)CANOPY_RUNNING); word < shapes[type].words;
+             word++) {
+            words[nodes[node].state + word] = (uint16_t)Frama_C_unsigned_int_interval(0, UINT16_MAX);
         }
+        if (status[node] == (uint8_t)CANOPY_IDLE || status[node] > (uint8_t)CANOPY_SKIPPED) {
+            status[node] = any_idle;
+        }
+        ticked[node] = 0;
     }
     instance.faults = Frama_C_unsigned_int_interval(0, UINT32_MAX);
     instance.fault_node = (uint16_t)Frama_C_unsigned_int_interval(0, UINT16_MAX);
@@ -236,18 +276,17 @@ int main(void)
     unsigned least = shapes[ROOT].least;
     unsigned most = shapes[ROOT].most < MOST ? shapes[ROOT].most : MOST;
     unsigned children = Frama_C_unsigned_int_interval(least, most);
-    unsigned place = Frama_C_unsigned_int_interval(0, most);
-    unsigned turn = Frama_C_unsigned_int_interval(0, 1);
     unsigned inner = Frama_C_unsigned_int_interval(0, CANOPY_NODE_TYPES - 1);
     canopy_error_t error;
 
     /*@ split children; */
-    /*@ split place; */
-    /*@ split turn; */
     /*@ split inner; */
-    if (place > children || (place == children && inner != 0u)) {
+    if (inner != (unsigned)CANOPY_NODE_STATEFUL_ACTION &&
+        (!IS_INNER(inner) || children != (least > 2u || most < 2u ? least : 2u))) {
         return 0;
     }
+    any_idle =
+        (uint8_t)Frama_C_nondet(CANOPY_IDLE, Frama_C_interval(CANOPY_STATUS_WAS, CANOPY_STATUS_WAS + CANOPY_SKIPPED));
     tree = (canopy_tree_t){.nodes = nodes,
                            .leaves = leaves,
                            .controls = controls,
@@ -256,16 +295,13 @@ int main(void)
                            .leaf_count = 2,
                            .control_count = 1,
                            .script_count = 1};
-    build(nodes, parameters, (uint8_t)inner, children, place, turn);
+    build(nodes, parameters, (uint8_t)inner, children);
     error = canopy_tree_validate(&tree, NULL);
     /*@ assert accepted: error == CANOPY_OK; */
     error = canopy_tree_init(&instance, &tree, status, words, NULL);
     /*@ assert made: error == CANOPY_OK; */
     while (Frama_C_interval(0, 1) != 0) {
-        any_numbers(nodes, words);
-        for (uint16_t node = 0; node < tree.node_count; node++) {
-            ticked[node] = 0;
-        }
+        forget(nodes, status, words);
         switch (Frama_C_interval(0, 2)) {
         case 0: {
             canopy_status_t root = canopy_tree_tick(&instance, Frama_C_unsigned_long_long_interval(0, UINT64_MAX));
