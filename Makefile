@@ -101,9 +101,10 @@ fuzz: ## libFuzzer on tables, images, states, frames and traces, FUZZ_SECONDS=60
 	$(call BUILD,fuzz)
 	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
 
-proof: ## Frama-C on the ring and the E2E check: no undefined behaviour for any input (installs 1.1 GB)
+proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any input (installs 1.2 GB)
 	$(SETUP)/ensure-packages proof
-	tests/proof/run
+	$(SETUP)/make-venv can
+	$(PYTHON) tests/proof/run.py
 
 bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench

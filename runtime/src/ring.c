@@ -32,12 +32,22 @@ canopy_error_t canopy_ring_init(canopy_ring_t *ring, void *storage, size_t stora
     return CANOPY_OK;
 }
 
+/*@ requires canopy_ring_is_sound((canopy_ring_t *)ring);
+    assigns \nothing;
+    ensures \result == ring->storage + canopy_ring_place((canopy_ring_t *)ring, index);
+    ensures 0 <= canopy_ring_place((canopy_ring_t *)ring, index) <=
+            canopy_ring_bytes((canopy_ring_t *)ring) - ring->element_size;
+*/
 static uint8_t *place(const canopy_ring_t *ring, uint32_t index)
 {
     return ring->storage + (size_t)(index & (ring->capacity - 1u)) * ring->element_size;
 }
 
 /* For a counter with a single writer: a load and a store cannot lose an increment. */
+/*@ requires \valid(counter);
+    assigns *counter;
+    ensures *counter == (uint32_t)(\old(*counter) + 1);
+*/
 static void count_up(_Atomic uint32_t *counter)
 {
     atomic_store_explicit(counter, atomic_load_explicit(counter, memory_order_relaxed) + 1u, memory_order_relaxed);

@@ -29,6 +29,10 @@ typedef struct {
  * True when the time `now` is at or after `deadline`; right across the wrap-around of the 64-bit count, as long as the
  * two are less than 2^63 us apart. O(1); may be called from anywhere.
  */
+/*@ assigns \nothing;
+    ensures \forall integer turns, elapsed; now == deadline + elapsed + turns * (UINT64_MAX + 1) &&
+            -0x8000000000000000 <= elapsed < 0x8000000000000000 ==> (\result == true <==> elapsed >= 0);
+*/
 static inline bool canopy_time_reached(canopy_time_t now, canopy_time_t deadline)
 {
     return (now - deadline) < (UINT64_C(1) << 63);

@@ -42,6 +42,23 @@ typedef struct {
     _Atomic uint32_t high_water; /**< Written by the producer only. */
 } canopy_ring_t;
 
+/*
+ * The comments that begin with an at sign are contracts in ACSL: Frama-C's WP proves them (docs/verification.md), for
+ * one context at a time. A ring is sound between any two calls once canopy_ring_init() has said CANOPY_OK.
+ */
+/*@ logic integer canopy_ring_waiting(canopy_ring_t *ring) =
+        ring->head - ring->tail + (ring->head < ring->tail ? 0x100000000 : 0);
+    logic integer canopy_ring_bytes(canopy_ring_t *ring) = ring->capacity * ring->element_size;
+    logic integer canopy_ring_place(canopy_ring_t *ring, integer index) =
+        (index & (ring->capacity - 1)) * ring->element_size;
+
+    predicate canopy_ring_is_sound(canopy_ring_t *ring) =
+        \valid(ring) && 1 <= ring->capacity <= 0x80000000 && 1 <= ring->element_size &&
+        canopy_ring_bytes(ring) <= SIZE_MAX && \valid(ring->storage + (0 .. canopy_ring_bytes(ring) - 1)) &&
+        \separated(ring, ring->storage + (0 .. canopy_ring_bytes(ring) - 1)) &&
+        canopy_ring_waiting(ring) <= ring->capacity && ring->high_water <= ring->capacity;
+*/
+
 /**
  * Makes an empty ring over the caller's storage, which must live as long as the ring.
  *
@@ -54,6 +71,14 @@ typedef struct {
  *
  * Complexity: O(1).
  */
+/*@ requires ring == \null || \valid(ring);
+    requires storage == \null || \valid((uint8_t *)storage + (0 .. storage_size - 1));
+    requires \separated(ring, (uint8_t *)storage + (0 .. storage_size - 1));
+    assigns *ring;
+    ensures \result == CANOPY_OK || \result == CANOPY_ERROR_ARGUMENT;
+    ensures \result == CANOPY_OK ==> canopy_ring_is_sound(ring) && canopy_ring_waiting(ring) == 0 &&
+            ring->storage == storage && ring->element_size == element_size && ring->capacity == capacity;
+*/
 canopy_error_t canopy_ring_init(canopy_ring_t *ring, void *storage, size_t storage_size, size_t element_size,
                                 uint32_t capacity);
 
@@ -64,6 +89,29 @@ canopy_error_t canopy_ring_init(canopy_ring_t *ring, void *storage, size_t stora
  *
  * Complexity: O(element_size).
  */
+/*@ requires canopy_ring_is_sound(ring);
+    requires \valid_read((uint8_t *)element + (0 .. ring->element_size - 1));
+    requires \separated((uint8_t *)element + (0 .. ring->element_size - 1), ring,
+                        ring->storage + (0 .. canopy_ring_bytes(ring) - 1));
+    assigns ring->head, ring->dropped, ring->high_water, ring->storage[0 .. canopy_ring_bytes(ring) - 1];
+    ensures canopy_ring_is_sound(ring);
+    ensures \old(ring->high_water) <= ring->high_water;
+    behavior full:
+      assumes canopy_ring_waiting(ring) == ring->capacity;
+      assigns ring->dropped;
+      ensures \result == false && ring->dropped == (uint32_t)(\old(ring->dropped) + 1);
+    behavior room:
+      assumes canopy_ring_waiting(ring) < ring->capacity;
+      assigns ring->head, ring->high_water,
+              ring->storage[canopy_ring_place(ring, ring->head) ..
+                            canopy_ring_place(ring, ring->head) + ring->element_size - 1];
+      ensures \result == true && ring->head == (uint32_t)(\old(ring->head) + 1);
+      ensures canopy_ring_waiting(ring) == \old(canopy_ring_waiting(ring)) + 1 <= ring->high_water;
+      ensures \forall integer byte; 0 <= byte < ring->element_size ==>
+              ring->storage[canopy_ring_place(ring, \old(ring->head)) + byte] == ((uint8_t *)element)[byte];
+    complete behaviors;
+    disjoint behaviors;
+*/
 bool canopy_ring_push(canopy_ring_t *ring, const void *element);
 
 /**
@@ -73,6 +121,26 @@ bool canopy_ring_push(canopy_ring_t *ring, const void *element);
  *
  * Complexity: O(element_size).
  */
+/*@ requires canopy_ring_is_sound(ring);
+    requires \valid((uint8_t *)element + (0 .. ring->element_size - 1));
+    requires \separated((uint8_t *)element + (0 .. ring->element_size - 1), ring,
+                        ring->storage + (0 .. canopy_ring_bytes(ring) - 1));
+    assigns ring->tail, ((uint8_t *)element)[0 .. ring->element_size - 1];
+    ensures canopy_ring_is_sound(ring);
+    behavior empty:
+      assumes canopy_ring_waiting(ring) == 0;
+      assigns \nothing;
+      ensures \result == false;
+    behavior waiting:
+      assumes canopy_ring_waiting(ring) > 0;
+      assigns ring->tail, ((uint8_t *)element)[0 .. ring->element_size - 1];
+      ensures \result == true && ring->tail == (uint32_t)(\old(ring->tail) + 1);
+      ensures canopy_ring_waiting(ring) == \old(canopy_ring_waiting(ring)) - 1;
+      ensures \forall integer byte; 0 <= byte < ring->element_size ==>
+              ((uint8_t *)element)[byte] == ring->storage[canopy_ring_place(ring, \old(ring->tail)) + byte];
+    complete behaviors;
+    disjoint behaviors;
+*/
 bool canopy_ring_pop(canopy_ring_t *ring, void *element);
 
 /**
@@ -81,15 +149,27 @@ bool canopy_ring_pop(canopy_ring_t *ring, void *element);
  *
  * Complexity: O(1).
  */
+/*@ requires canopy_ring_is_sound(ring);
+    assigns \nothing;
+    ensures \result == canopy_ring_waiting(ring);
+*/
 uint32_t canopy_ring_count(const canopy_ring_t *ring);
 
 /** Number of elements refused because the ring was full, modulo 2^32. Anyone. Never reset. O(1). */
+/*@ requires \valid_read(ring);
+    assigns \nothing;
+    ensures \result == ring->dropped;
+*/
 uint32_t canopy_ring_dropped(const canopy_ring_t *ring);
 
 /**
  * Most elements that ever waited at once, as the producer saw it at a push: an element that the consumer was just
  * taking still counts. Anyone. Never reset. O(1).
  */
+/*@ requires \valid_read(ring);
+    assigns \nothing;
+    ensures \result == ring->high_water;
+*/
 uint32_t canopy_ring_high_water(const canopy_ring_t *ring);
 
 #endif
