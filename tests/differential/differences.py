@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from differential import model
 from differential.model import COMPLETED, ModelTree, Node, World
-from differential.tree import ATTRIBUTES, FAILURE, IDLE, RUNNING, SKIPPED, Outcome, Tree
+from differential.tree import ATTRIBUTES, FAILURE, IDLE, RUNNING, SKIPPED, Outcome, Spec, Tree
 
 RULES: dict[str, str] = {
     "skipped condition": "IfThenElse and WhileDoElse throw when their condition is SKIPPED",
@@ -463,9 +463,16 @@ def run_differing_model(tree: Tree) -> Explained:
     return explained
 
 
+def _element(spec: Spec) -> Spec:
+    """What the XML has in its place: Attributes are not an element, but stand on the one below."""
+    while spec.kind == "Attributes":
+        spec = spec.children[0]
+    return spec
+
+
 def can_load(tree: Tree) -> bool:
     """Whether BehaviorTree.CPP accepts the tree: a ReactiveSequence may have one child that is an AsyncSequence."""
     return all(
-        spec.kind != "ReactiveSequence" or [child.kind for child in spec.children].count("AsyncSequence") < 2
+        spec.kind != "ReactiveSequence" or [_element(child).kind for child in spec.children].count("AsyncSequence") < 2
         for spec in tree.root.walk()
     )

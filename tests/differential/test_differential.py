@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import platform
 import random
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -27,7 +28,7 @@ from differential.generate import DEPTH_MAX, NODES_MAX, Wanted, generate
 from differential.model import Node, run_model
 from differential.paper import acted, experiment
 from differential.settings import BTCPP_TREES, MODEL_TREES, SEED, TIMEOUT_S
-from differential.tree import FAILURE, HALTED, RUNNING, SHAPES, SUCCESS, Tree, engine_kinds
+from differential.tree import ATTRIBUTES, FAILURE, HALTED, RUNNING, SHAPES, SUCCESS, Spec, Tree, engine_kinds
 
 Figure = Callable[[str], None]
 
@@ -86,6 +87,22 @@ def test_the_engine_does_what_the_model_says(runner: Path, figure: Figure) -> No
         f"engine and model: {report.trees} trees of {sum(nodes) / len(nodes):.1f} nodes ({max(nodes)} at most), "
         f"{report.ticks} ticks and halts, {len(engine_kinds())} kinds of nodes, {time.monotonic() - begin:.1f} s"
     )
+
+
+@needs_btcpp
+@pytest.mark.parametrize(("asynchronous", "loads"), [(1, True), (2, False)])
+def test_what_behaviortree_cpp_does_not_load_is_known(asynchronous: int, loads: bool) -> None:
+    """Also where the nodes that it does not want have conditions, which stand above them in our trees."""
+    leaf = Spec("AlwaysSuccess", [])
+    scripts = (None,) * len(ATTRIBUTES)
+    children = [Spec("Attributes", [Spec("AsyncSequence", [leaf])], scripts=scripts) for _ in range(asynchronous)]
+    tree = Tree(Spec("ReactiveSequence", children), (0,))
+    assert can_load(tree) == loads
+    if loads:
+        assert run_btcpp([tree])[0][1] == ""
+    else:
+        with pytest.raises(subprocess.CalledProcessError):
+            run_btcpp([tree])
 
 
 @needs_btcpp
