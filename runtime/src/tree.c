@@ -225,8 +225,10 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
         canopy_attributes_halt(self, node);
         break;
     case CANOPY_NODE_TRY_CATCH:
+        /* The status first, so that the call is the last thing done: no frame of this function below a leaf's. */
+        self->status[node] |= (uint8_t)CANOPY_STATUS_WAS;
         canopy_try_catch_halt(self, node);
-        break;
+        return;
     case CANOPY_NODE_USER_CONTROL:
     case CANOPY_NODE_USER_DECORATOR:
         canopy_user_halt(self, node);

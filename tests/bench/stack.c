@@ -74,10 +74,21 @@ static const canopy_script_t scripts[] = {script, seldom, script};
 
 /**
  * Thresholds, counts and times of 2; scripts, and FAILURE for a status; the scripts of Attributes, of which the first three
- * keep the node below from being ticked.
+ * keep the node below from being ticked; and what a TestNode has.
  */
-static const int32_t parameters[] = {2, 2, 0, CANOPY_FAILURE, 1, 1, 1, 0, 0, 0, 0, 0};
-enum { PLAIN = 0, SCRIPTED = 2, ATTRIBUTES = 4 };
+static const int32_t parameters[] = {2, 2, 0, CANOPY_FAILURE, 1, 1, 1, 0, 0, 0, 0, 0, CANOPY_FAILURE, 2, 0, 1, 2};
+enum { PLAIN = 0, SCRIPTED = 2, ATTRIBUTES = 4, TEST_NODE = 12 };
+
+static uint16_t parameters_of(canopy_node_type_t type)
+{
+    if (type == CANOPY_NODE_ATTRIBUTES) {
+        return ATTRIBUTES;
+    }
+    if (type == CANOPY_NODE_TEST_NODE) {
+        return TEST_NODE;
+    }
+    return type >= CANOPY_NODE_PRECONDITION && type <= CANOPY_NODE_SWITCH ? SCRIPTED : PLAIN;
+}
 
 typedef struct {
     uint8_t least_children;
@@ -100,16 +111,13 @@ static canopy_tree_t tree;
 
 static uint16_t add(canopy_node_type_t type, uint16_t parent)
 {
-    bool scripted = type >= CANOPY_NODE_PRECONDITION && type <= CANOPY_NODE_SWITCH;
     uint16_t node = tree.node_count++;
 
     nodes[node] = (canopy_node_t){.type = (uint8_t)type,
                                   .parent = parent,
                                   .end = (uint16_t)(node + 1u),
                                   .state = tree.word_count,
-                                  .parameter = type == CANOPY_NODE_ATTRIBUTES ? ATTRIBUTES
-                                               : scripted                     ? SCRIPTED
-                                                                              : PLAIN};
+                                  .parameter = parameters_of(type)};
     tree.word_count = (uint16_t)(tree.word_count + shapes[type].words);
     return node;
 }

@@ -55,7 +55,8 @@ def test_both_goals_are_reached(build_dir: Path, bus_dir: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_and_all_it_has_started(build_dir: Path, bus_dir: Path, number: signal.Signals) -> None:
-    command = [*NO_ROUTE, *demo(build_dir, "--can", "unixbus:demo")]
+    # The tests may run under nohup, which has SIGHUP ignored, and the demo respects that.
+    command = ["env", "--default-signal", *NO_ROUTE, *demo(build_dir, "--can", "unixbus:demo")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         end = time.monotonic() + 30
         while len(started := descendants(process.pid)) < 2:

@@ -17,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 from canopy.cli import main
+from integration.compilers import COMPILERS
 from integration.language import ROOT, WARNINGS
 from integration.test_readme import blocks
 
@@ -89,7 +90,7 @@ def test_the_output_is_laid_out_as_the_house_does(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_output_has_no_warning(name: str, compiler: str) -> None:
     include = [f"-I{ROOT / 'runtime' / 'include'}", f"-I{GOLDEN / name}", *(f"-I{x}" for x in OUTPUTS[name][1])]
     for file in sorted((GOLDEN / name).glob("*.c")):
