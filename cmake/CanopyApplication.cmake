@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
-#                        [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
+#                        [MAIN_TREE id] [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
 #                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
 #                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
@@ -36,7 +36,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
-                        "TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
+                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -54,7 +54,7 @@ function(canopy_add_application NAME)
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
-  foreach(option INCLUDE BITRATE MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
+  foreach(option MAIN_TREE INCLUDE BITRATE MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
     if(APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")

@@ -258,6 +258,20 @@ def test_texts_of_a_leaf_need_names_of_their_own(tmp_path: Path) -> None:
         assert "gives no C name of its own" in result.stderr
 
 
+def test_the_main_tree_can_be_named_from_outside(tmp_path: Path) -> None:
+    trees = "".join(f"<BehaviorTree ID='{name}'><AlwaysSuccess/></BehaviorTree>" for name in ("A", "B"))
+    files = {"main.xml": f"<root BTCPP_format='4'>{trees}</root>"}
+    refused = compile_files(tmp_path, files)
+    assert refused.exit_code == 2
+    assert "several trees, and no main_tree_to_execute says which" in refused.stderr
+    assert "--main-tree" in refused.stderr
+    assert compile_files(tmp_path, files, "--main-tree", "B").exit_code == 0
+    assert "tables of tree B" in (tmp_path / "out" / "main_app.c").read_text()
+    wrong = compile_files(tmp_path, files, "--main-tree", "C")
+    assert wrong.exit_code == 2
+    assert "--main-tree: error: 'C' is no tree of" in wrong.stderr
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_unset_ports_are_zero_where_that_is_allowed(tmp_path: Path, compiler: str) -> None:
     ports = {"count": "uint8_t", "on": "bool", "name": "string", "limit": "int16_t*0.1", "pose": "pose_t"}

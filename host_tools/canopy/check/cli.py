@@ -64,6 +64,7 @@ def command(
     unset_ports: bool,
     type_map: tuple[str, ...],
     packages: tuple[str, ...],
+    main_tree: str | None,
     severity: str,
     disable: tuple[str, ...],
     strict: bool,
@@ -90,7 +91,7 @@ def command(
     rules = _wanted(disable, Severity[severity.upper()])
     bus = BusOptions(dbc, node, period_ms) if dbc is not None and node is not None else None
     try:
-        types = read_type_options(include, floats, unset_ports, type_map, packages)
+        types = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)

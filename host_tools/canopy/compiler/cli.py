@@ -51,9 +51,15 @@ package_option = click.option(
 )
 
 
+main_tree_option = click.option(
+    "--main-tree", metavar="ID", help="The tree to take, where the file has several and no main_tree_to_execute."
+)
+
+
 def type_options(command: _Command) -> _Command:
     """The options about types and includes, of the commands that look into ports and scripts."""
     for option in (
+        main_tree_option,
         package_option,
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
@@ -89,7 +95,12 @@ def read_packages(packages: tuple[str, ...]) -> dict[str, Path]:
 
 
 def read_type_options(
-    include: str | None, floats: bool, unset_ports: bool, type_map: tuple[str, ...], packages: tuple[str, ...]
+    include: str | None,
+    floats: bool,
+    unset_ports: bool,
+    type_map: tuple[str, ...],
+    packages: tuple[str, ...],
+    main_tree: str | None,
 ) -> Options:
     """What `type_options` were given.
 
@@ -102,7 +113,7 @@ def read_type_options(
         if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
-    return Options(floats, result, include, read_packages(packages), unset_ports)
+    return Options(floats, result, include, read_packages(packages), unset_ports, main_tree)
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
@@ -140,6 +151,7 @@ def command(
     unset_ports: bool,
     type_map: tuple[str, ...],
     packages: tuple[str, ...],
+    main_tree: str | None,
     stubs_file: Path | None,
     depfile: Path | None,
     image_nodes: int | None,
@@ -161,7 +173,7 @@ def command(
       canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
     """
     try:
-        options = read_type_options(include, floats, unset_ports, type_map, packages)
+        options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         images = _images(image_nodes, image_uses)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)

@@ -118,7 +118,13 @@ class _Reader:
             )
 
 
-def _choose_tree(root: Element, trees: dict[str, Element]) -> str:
+def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) -> str:
+    if asked is not None:
+        if asked not in trees:
+            raise CompileError(
+                Place("--main-tree"), f"'{asked}' is no tree of {root.place.file}", nearest(asked, trees)
+            )
+        return asked
     wanted = root.attributes.get("main_tree_to_execute")
     if wanted is not None:
         if wanted not in trees:
@@ -132,7 +138,11 @@ def _choose_tree(root: Element, trees: dict[str, Element]) -> str:
     for candidates in (own, list(trees)):
         if len(candidates) == 1:
             return candidates[0]
-    raise CompileError(root.place, "several trees, and no main_tree_to_execute says which", nearest("", trees))
+    raise CompileError(
+        root.place,
+        "several trees, and no main_tree_to_execute says which",
+        f"say it there, or with --main-tree; {nearest('', trees)}",
+    )
 
 
 def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Documents:
@@ -146,5 +156,5 @@ def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Do
     documents = reader.documents
     if not documents.trees:
         raise CompileError(Place(root.place.file, 1, 1), "no <BehaviorTree> in this file")
-    documents.main = _choose_tree(root, documents.trees)
+    documents.main = _choose_tree(root, documents.trees, options.main_tree)
     return documents

@@ -104,13 +104,14 @@ PORT_TYPES: dict[str, PortType] = {
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says about types, and where the ROS packages are whose trees may be included."""
+    """What the command line says about types and trees, and where the ROS packages are whose trees may be included."""
 
     floats: bool = False
     type_map: dict[str, str] = field(default_factory=dict)
     include: str | None = None
     ros_packages: dict[str, Path] = field(default_factory=dict)
     unset_ports: bool = False  # input ports may have neither a value nor a default: 0, false or NULL
+    main_tree: str | None = None  # instead of the file's main_tree_to_execute
     any_type: bool = False  # types for which there is nothing in C are accepted
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from canopy.compiler.cli import package_option, read_packages
+from canopy.compiler.cli import main_tree_option, package_option, read_packages
 from canopy.compiler.errors import CompileError
 from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
@@ -36,11 +36,13 @@ def _write(target: str, text: str) -> None:
 @click.option("--svg", "svg_file", metavar="FILE", help="Draw it as SVG into FILE; - is standard output.")
 @click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
 @package_option
+@main_tree_option
 def command(
     tree: Path,
     svg_file: str | None,
     dot_file: str | None,
     packages: tuple[str, ...],
+    main_tree: str | None,
 ) -> None:
     """Draw TREE: in the terminal, as SVG, or as DOT.
 
@@ -54,7 +56,7 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages)))
+        checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages), main_tree=main_tree))
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
