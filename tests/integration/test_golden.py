@@ -2,7 +2,7 @@
 """What the compiler writes is C that was reviewed: tests/golden/ holds it, byte for byte.
 
 A change of the output is meant to be seen in a diff. `make golden` writes the files anew; read them, and commit them
-with the change that they come from.
+with the change that they come from. `make lint` holds them to the house's layout, like all C here.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -23,7 +22,6 @@ from integration.test_readme import blocks
 
 GOLDEN = ROOT / "tests" / "golden"
 COURIER = ROOT / "examples" / "courier"
-CLANG_FORMAT = Path(sys.executable).with_name("clang-format")
 TYPE_MAP = [
     *("--type-map", "geometry_msgs::msg::PoseStamped_<std::allocator<void>>=pose_t"),
     *("--type-map", "nav_msgs::msg::Path_<std::allocator<void>>=path_t"),
@@ -77,16 +75,6 @@ def test_the_output_is_the_one_that_was_reviewed(name: str, tmp_path: Path) -> N
     assert sorted(made) == sorted(golden)
     for file, content in made.items():
         assert content.decode() == golden[file].decode(), f"{file} has changed; if that is right: make golden"
-
-
-@pytest.mark.parametrize("name", OUTPUTS)
-def test_the_output_is_laid_out_as_the_house_does(name: str) -> None:
-    files = [str(file) for file in sorted((GOLDEN / name).iterdir()) if file.suffix in (".c", ".h")]
-    if CLANG_FORMAT.is_file():
-        style = f"--style=file:{ROOT / '.clang-format'}"
-        subprocess.run([str(CLANG_FORMAT), style, "--dry-run", "-Werror", *files], check=True)
-    for file in files:
-        assert max(map(len, Path(file).read_text().splitlines())) <= 120, file
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
