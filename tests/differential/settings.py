@@ -3,7 +3,8 @@
 
 import os
 
-SEED = int(os.environ.get("CANOPY_SEED") or "20261123")
+DEFAULT_SEED = 20261123
+SEED = int(os.environ.get("CANOPY_SEED") or DEFAULT_SEED)
 _TREES = os.environ.get("CANOPY_TREES")
 
 MODEL_TREES = int(_TREES) if _TREES else 2_000

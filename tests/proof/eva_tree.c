@@ -177,6 +177,8 @@ static void add(canopy_node_t *nodes, int32_t *parameters, uint8_t type, uint16_
     }
     if (type == (uint8_t)CANOPY_NODE_PRECONDITION || type == (uint8_t)CANOPY_NODE_LOOP) {
         parameters[tree.parameter_count - 1u] = (int32_t)any_result();
+    } else if (type == (uint8_t)CANOPY_NODE_TEST_NODE) {
+        parameters[nodes[node].parameter] = (int32_t)any_result();
     } else if (type < (uint8_t)CANOPY_NODE_PRECONDITION || type > (uint8_t)CANOPY_NODE_SWITCH) {
         nodes[node].asks = (uint8_t)((1u << shapes[type].parameters) - 1u);
     }

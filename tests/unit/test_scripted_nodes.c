@@ -319,6 +319,20 @@ static void a_parameter_may_be_a_script(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
 }
 
+static void a_number_of_cycles_that_becomes_0_halts_the_child(void)
+{
+    static const canopy_node_t nodes[] = {{.type = CANOPY_NODE_REPEAT, .end = 2, .asks = 1}, ACTION(0, 1, 0)};
+    static const int32_t script[] = {3};
+
+    answers[3] = 2;
+    start(nodes, 2, script, 1);
+    EXPECT("R", CANOPY_RUNNING, "DaD");
+    answers[3] = 0;
+    EXPECT("R", CANOPY_SUCCESS, "Da!");
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 1));
+    EXPECT("R", CANOPY_SUCCESS, "D");
+}
+
 static void refuses(const int32_t *parameters, canopy_node_type_t type)
 {
     static canopy_node_t nodes[] = {INNER(ATTRIBUTES, 0, 2, 0, 0), ACTION(0, 1, 0)};
@@ -375,6 +389,7 @@ int main(void)
     RUN_TEST(a_control_node_of_the_users_own);
     RUN_TEST(wrong_answers_of_a_users_node_are_faults);
     RUN_TEST(a_parameter_may_be_a_script);
+    RUN_TEST(a_number_of_cycles_that_becomes_0_halts_the_child);
     RUN_TEST(the_validator_refuses_scripts_and_statuses_that_are_none);
     return UNITY_END();
 }

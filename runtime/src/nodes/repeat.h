@@ -17,7 +17,13 @@ static inline canopy_step_t canopy_repeat_enter(canopy_tree_instance_t *self, ui
     if (!canopy_goes_on(self, node)) {
         canopy_set32(canopy_words(self, node), 0u);
     }
-    return canopy_parameter(self, node, 0) == 0 ? canopy_done(again) : node + 1u;
+    if (canopy_parameter(self, node, 0) != 0) {
+        return node + 1u;
+    }
+    if (canopy_resumes(self, node)) { /* an entry gives the number, and has become 0 while the child runs */
+        canopy_reset_child(self, (uint16_t)(node + 1u));
+    }
+    return canopy_done(again);
 }
 
 static inline canopy_step_t canopy_repeat_child(canopy_tree_instance_t *self, uint16_t node, uint16_t child,
