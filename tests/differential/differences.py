@@ -325,10 +325,18 @@ class Precondition(Decorator, model.Precondition):
 
 
 class Loop(Decorator, model.Loop):
+    """Gets its list when it starts from IDLE; where a precondition has answered for it before that, it has none."""
+
+    has_list = False
+
     def starts(self) -> bool:
         if self.code in COMPLETED or (self.code == RUNNING and self.was_skipped):
             self.world.differs("loop goes on")
         return self.code == IDLE
+
+    def take(self) -> bool:
+        self.has_list = self.starts() or self.has_list
+        return self.has_list and super().take()
 
 
 class Switch(BtCppNode, model.Switch):
