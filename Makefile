@@ -8,6 +8,8 @@ PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
 SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
+# Of check-all, which judges every change by the same random trees. `make test-differential` takes new ones each time.
+SEED := 20261123
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
@@ -63,7 +65,7 @@ format: ## let clang-format and ruff rewrite the sources
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,test,differential
-	@$(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
+	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
 	$(call BUILD,clang)
@@ -86,7 +88,7 @@ coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fail
 	LLVM_PROFILE_FILE="$(CURDIR)/build/coverage/profiles/%m-%p.profraw" ctest --preset coverage
 	$(PYTHON) tests/coverage/report.py build/coverage runtime
 
-test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed each time
+test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed unless one is given
 	$(call BUILD,host)
 	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
 
