@@ -130,6 +130,24 @@ def test_floating_point_constants(tmp_path: Path) -> None:
     assert struct.pack("<Q", both) == struct.pack("<d", 0.1)
 
 
+def test_unset_ports_are_zero_and_their_null_is_the_firmwares(tmp_path: Path) -> None:
+    ports = "<input_port name='n' type='uint8_t'/><input_port name='t' type='string'/>"
+    model = f"<TreeNodesModel><Action ID='Go'>{ports}</Action></TreeNodesModel>"
+    trees = {"unset": "<Go/>", "none": "<Go n='3' t='hi'/>"}
+    models = {}
+    for name, node in trees.items():
+        file = tmp_path / f"{name}.xml"
+        file.write_text(f"<root BTCPP_format='4'><BehaviorTree ID='A'>{node}</BehaviorTree>{model}</root>")
+        options = ("--allow-unset-ports", "--image-nodes", 4)
+        models[name] = compile_firmware(file, EXCHANGE / "exchange.dbc", tmp_path / name, *options)
+    image = tmp_path / "x.img"
+    assert run("image", "build", tmp_path / "unset.xml", "--for", models["unset"], "-o", image).exit_code == 0
+    assert read_image(image).values == ((1, 0), (0, 0))
+    image.unlink()
+    refused = run("image", "build", tmp_path / "unset.xml", "--for", models["none"], "-o", image)
+    expect_refused(tmp_path, refused, "unset.xml:1:45", "no use of 'Go' has t like this")
+
+
 def test_a_model_file_goes_along(tmp_path: Path, firmware: Path) -> None:
     output, rule = tmp_path / "other.img", tmp_path / "d"
     arguments = ("--for", firmware, "-o", output, "--model", "--depfile", rule)

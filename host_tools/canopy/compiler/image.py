@@ -187,7 +187,7 @@ class _Writer:
             raise self._error(
                 node.place,
                 f"no use of '{use.leaf.id}' has {' and '.join(fixed)} like this",
-                "signals, texts from entries and constants of your own types are bound together, as in one use there",
+                "signals, texts from entries, constants of your own types, NULL: bound together, as in one use there",
             )
         self._uses.append(base)
         for port, bound in zip(use.leaf.ports, node.bound, strict=True):
