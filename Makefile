@@ -10,6 +10,7 @@ SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
 # Of check-all, which judges every change by the same random trees. `make test-differential` takes new ones each time.
 SEED := 20261123
+PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
@@ -72,13 +73,8 @@ test-clang: # the unit tests, and the tests of generated C that need a second co
 	ctest --preset clang
 	$(PYTEST) -m clang
 
-test-portable: # 32 bit, big-endian, and clang's sanitizers: the unit tests
-	$(call BUILD,i686)
-	ctest --preset i686
-	$(call BUILD,powerpc)
-	ctest --preset powerpc
-	$(call BUILD,asan-clang)
-	ctest --preset asan-clang
+test-portable: # 32 bit, big-endian, and the sanitizers there and with clang: the unit tests
+	@for preset in $(PORTABLE); do $(call BUILD,$$preset) && ctest --preset $$preset || exit 1; done
 
 coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fails below 100 %
 	$(SETUP)/ensure-packages coverage

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Instruments everything built here, so that no part is missed:
-#   CANOPY_SANITIZE  the address and undefined-behaviour sanitizers
+#   CANOPY_SANITIZE  sanitizers: address,undefined, or one of them
 #   CANOPY_COVERAGE  clang's counters for lines, branches and MC/DC (clang 19 or later)
 #   CANOPY_FUZZ      both sanitizers, and the guidance that libFuzzer needs (clang)
 # CANOPY_INSTRUMENTED is true with any of them: such objects need symbols and memory of their own.
@@ -8,10 +8,13 @@ option(CANOPY_COVERAGE "Count lines, branches and MC/DC while the tests run (cla
 option(CANOPY_FUZZ "Build the fuzz targets of tests/fuzz (clang)" OFF)
 
 set(CANOPY_INSTRUMENTED OFF)
-if(CANOPY_SANITIZE OR CANOPY_FUZZ)
+if(CANOPY_FUZZ)
+    set(CANOPY_SANITIZE address,undefined)
+endif()
+if(CANOPY_SANITIZE)
     set(CANOPY_INSTRUMENTED ON)
-    add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
-    add_link_options(-fsanitize=address,undefined)
+    add_compile_options(-fsanitize=${CANOPY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    add_link_options(-fsanitize=${CANOPY_SANITIZE})
 endif()
 if(CANOPY_FUZZ)
     add_compile_options(-fsanitize=fuzzer-no-link)

@@ -1,10 +1,20 @@
 # SPDX-License-Identifier: MIT
-# 32-bit x86, Debian's cross compiler. An x86-64 kernel runs the programs; they are linked statically, so that no C
-# library of that kind need be installed where they run.
+# 32-bit x86, Debian's cross compiler, or clang with its headers and libraries. An x86-64 kernel runs the programs; they are
+# linked statically, so that no C library of that kind need be installed where they run. The address sanitizer has to be
+# loaded before the C library, so programs with a sanitizer use the cross compiler's own.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR i686)
-set(CMAKE_C_COMPILER i686-linux-gnu-gcc)
-set(CMAKE_EXE_LINKER_FLAGS_INIT "-static")
+if(NOT CMAKE_C_COMPILER)
+    set(CMAKE_C_COMPILER i686-linux-gnu-gcc)
+endif()
+set(CMAKE_C_COMPILER_TARGET i686-linux-gnu)
+if(CANOPY_SANITIZE)
+    set(i686_libraries /usr/i686-linux-gnu/lib)
+    set(CMAKE_EXE_LINKER_FLAGS_INIT
+        "-Wl,--dynamic-linker=${i686_libraries}/ld-linux.so.2 -Wl,-rpath,${i686_libraries}")
+else()
+    set(CMAKE_EXE_LINKER_FLAGS_INIT "-static")
+endif()
 set(CMAKE_CROSSCOMPILING_EMULATOR env)
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
