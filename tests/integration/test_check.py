@@ -206,7 +206,7 @@ def test_floating_point_and_types_of_the_users_own(tmp_path: Path) -> None:
     typed = file.read_text().replace(
         '<Action ID="Go"/>', "<Action ID=\"Go\"><input_port name='p' type='ns::P'/></Action>"
     )
-    file.write_text(typed)
+    file.write_text(typed.replace("<Script code='x := 0.5'/>", "<Go p='HOME'/>"))
     assert run(file).exit_code == 2
     assert run(file, "--type-map", "ns::P=p_t", "--include", "p.h").exit_code == 0
     wrong = run(file, "--type-map", "ns::P")

@@ -108,6 +108,16 @@ def test_a_wrong_declaration_of_a_leaf_is_named(tmp_path: Path, model: str, text
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("node", ["Action", "Condition", "Control", "Decorator"])
+def test_a_type_that_is_not_supported_blocks_only_trees_that_use_it(tmp_path: Path, node: str) -> None:
+    model = f"<Condition ID='Ready'/><{node} ID='Other'><input_port name='a' type='std::vector'/></{node}>"
+    assert compile_tree(tmp_path, TREE.format(nodes="    <Ready/>", model=model)).exit_code == 0
+    inner = "<Other><Ready/></Other>" if node in ("Control", "Decorator") else "<Other/>"
+    result = compile_tree(tmp_path, TREE.format(nodes=f"    {inner}", model=model))
+    assert result.exit_code == 2
+    assert "unsupported type 'std::vector'" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [

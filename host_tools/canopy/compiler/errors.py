@@ -36,6 +36,10 @@ class CompileError(Exception):
         return f"{text}\n  help: {self.help_text}" if self.help_text else text
 
 
+class UnsupportedTypeError(CompileError):
+    """A port has a type for which there is nothing in C. It matters only where a tree uses the port's node."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """A help text that names what `word` may have been meant to be: the nearest known name, else all of them."""
     names = sorted(set(known))

@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
@@ -84,7 +84,10 @@ class Port:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A node that the user writes in C. `kind` is the XML name of its node type."""
+    """A node that the user writes in C. `kind` is the XML name of its node type.
+
+    `problem` says why no tree can use it: files that are shared by several robots declare more than one of them needs.
+    """
 
     id: str
     kind: str
@@ -100,6 +103,7 @@ class Leaf:
     achieves: tuple[str, ...] = ()
     moves: tuple[str, ...] = ()
     hysteresis: str = ""
+    problem: UnsupportedTypeError | None = field(default=None, compare=False)
 
     @property
     def c_name(self) -> str:
@@ -129,6 +133,7 @@ class Declarations:
 class _Draft:
     metadata: dict[str, tuple[str, Place]] = field(default_factory=dict)
     ports: list[Port] = field(default_factory=list)
+    problem: UnsupportedTypeError | None = None
 
 
 def _read_port(element: Element, options: Options) -> Port:
@@ -199,7 +204,11 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
     draft = _Draft()
     for child in element.children:
         if child.tag in PORT_TAGS:
-            port = _read_port(child, options)
+            try:
+                port = _read_port(child, options)
+            except UnsupportedTypeError as error:
+                draft.problem = draft.problem or error
+                continue
             if any(port.c_name == other.c_name for other in draft.ports):
                 raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
             draft.ports.append(port)
@@ -249,6 +258,7 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         achieves=_words(draft, "achieves"),
         moves=_words(draft, "moves"),
         hysteresis=draft.metadata.get("hysteresis", ("", None))[0],
+        problem=draft.problem,
     )
 
 
@@ -269,7 +279,10 @@ def read_model(model: Element, into: Declarations, options: Options, built_in: f
             raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
         element.only("ID", "name", "editable", "description")
         if element.tag == "SubTree":
-            into.subtrees[node_id] = tuple(_read_draft(element, node_id, options).ports)
+            draft = _read_draft(element, node_id, options)
+            if draft.problem is not None:
+                raise draft.problem
+            into.subtrees[node_id] = tuple(draft.ports)
             continue
         if node_id in built_in:
             # Groot2 saves the models of built-in nodes too; what they are is not for the file to say.

@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.numbers import exact, plain
 
@@ -163,7 +163,8 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     """The type of that name. `where` says whose it is, for messages.
 
     Raises:
-        CompileError: it is no known type, or one that this application does not allow.
+        UnsupportedTypeError: it is no known type, or one that this application does not allow.
+        CompileError: it is a queue or a fixed-point type that cannot be.
     """
     normal = _normal(name)
     mapped = {_normal(key): _normal(value) for key, value in options.type_map.items()}
@@ -171,7 +172,7 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     known = PORT_TYPES.get(normal) or PORT_TYPES.get(normal.removeprefix("std::"))
     if known is not None:
         if known.kind == "float" and not options.floats:
-            raise CompileError(
+            raise UnsupportedTypeError(
                 place,
                 f"{where}: type '{name}' is floating point, which this application does not allow",
                 "use whole numbers of a smaller unit, or compile with --allow-floating-point",
@@ -187,16 +188,16 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     if options.any_type:
         return PortType("user", normal)
     if not is_c_identifier(normal):
-        raise CompileError(
+        raise UnsupportedTypeError(
             place,
             f"{where}: unsupported type '{name}'",
             f"give the C type of yours that stands for it: --type-map '{normal}=my_type_t'",
         )
     close = difflib.get_close_matches(normal, [n for n in PORT_TYPES if n], n=1, cutoff=0.85)
     if normal not in mapped.values() and close:
-        raise CompileError(place, f"{where}: unsupported type '{name}'", f"did you mean '{close[0]}'?")
+        raise UnsupportedTypeError(place, f"{where}: unsupported type '{name}'", f"did you mean '{close[0]}'?")
     if options.include is None:
-        raise CompileError(
+        raise UnsupportedTypeError(
             place,
             f"{where}: unsupported type '{name}'",
             "if it is a C type of yours, name its header with --include; else use one of: "

@@ -255,6 +255,8 @@ class _Builder:
                 raise CompileError(element.place, f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed))
 
     def _leaf_node(self, element: Element, leaf: Leaf, scope: Scope) -> Node:
+        if leaf.problem is not None:
+            raise leaf.problem
         self._check_attributes(element, {port.name for port in leaf.ports})
         bound = tuple(self._bind(element, leaf, port, scope) for port in leaf.ports)
         name = element.attributes.get("name", leaf.id)
@@ -379,7 +381,7 @@ def _expand(path: Path, documents: Documents, options: Options, tree_id: str) ->
         id=tree_id,
         path=path,
         root=root,
-        leaves=documents.declarations.leaves,
+        leaves={name: leaf for name, leaf in documents.declarations.leaves.items() if leaf.problem is None},
         files=tuple(documents.files),
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
