@@ -2,36 +2,16 @@
 /** @file The generated code of the application "features": ports, state, staleness, saturation, who wins an output. */
 #include <string.h>
 
-#include "fake_can.h"
+#include "fake_loop.h"
 #include "features_app.h"
 #include "unity.h"
 
-enum { PERIOD_US = 10000, CLIMATE_ID = 0x18FECA15 };
-
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
-static const canopy_loop_config_t config = {.app = &features_app, .can = &fake_can, .clock = &fake_clock};
-static canopy_loop_t loop;
-static canopy_time_t time;
+enum { CLIMATE_ID = 0x18FECA15 };
 
 void setUp(void)
 {
-    fake_can_reset();
-    time = 0;
+    fake_loop_start(&features_app);
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(features_app.tree, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
 }
 
 void tearDown(void)
@@ -49,11 +29,7 @@ static canopy_status_t cycle_at(int degrees)
     frame->data[1] = (uint8_t)((uint16_t)raw & 0xFFu);
     frame->data[2] = 0x06;
     memset(&frame->data[3], 0x11, 5);
-    fake.rx_count = 1;
-    fake.rx_taken = 0;
-    fake.tx_count = 0;
-    time += PERIOD_US;
-    return canopy_loop_cycle(&loop, time);
+    return fake_loop_cycle(1);
 }
 
 static void signals_reach_the_input_image(void)

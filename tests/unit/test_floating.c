@@ -3,35 +3,15 @@
 #include <string.h>
 
 #include "canopy/float_bits.h"
-#include "fake_can.h"
+#include "fake_loop.h"
 #include "floating_app.h"
 #include "unity.h"
 
-enum { PERIOD_US = 10000, LEVEL_ID = 0x100, FINE_ID = 0x101 };
-
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
-static const canopy_loop_config_t config = {.app = &floating_app, .can = &fake_can, .clock = &fake_clock};
-static canopy_loop_t loop;
-static canopy_time_t time;
+enum { LEVEL_ID = 0x100, FINE_ID = 0x101 };
 
 void setUp(void)
 {
-    fake_can_reset();
-    time = 0;
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    fake_loop_start(&floating_app);
 }
 
 void tearDown(void)
@@ -57,11 +37,7 @@ static canopy_status_t cycle(float water, float slope, double pressure)
     for (unsigned byte = 0; byte < 8u; byte++) {
         fake.rx[1].data[byte] = (uint8_t)(bits >> (8u * (7u - byte)));
     }
-    fake.rx_count = 2;
-    fake.rx_taken = 0;
-    fake.tx_count = 0;
-    time += PERIOD_US;
-    return canopy_loop_cycle(&loop, time);
+    return fake_loop_cycle(2);
 }
 
 static void scripts_and_ports_have_physical_values(void)

@@ -10,7 +10,7 @@
 #include "exchange_app.h"
 #include "exchange_main.inc"
 #include "exchange_other.inc"
-#include "fake_can.h"
+#include "fake_loop.h"
 #include "unity.h"
 
 enum { PERIOD_US = 10000, CLIMATE_ID = 256, FAN_ID = 512, TICKS = 60, NODES_MAX = 40, IMAGE_MAX = 2048 };
@@ -32,33 +32,13 @@ enum {
     AT_TEXTS = 52
 };
 
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
-static const canopy_loop_config_t config = {.app = &exchange_app, .can = &fake_can, .clock = &fake_clock};
-static canopy_loop_t loop;
-static canopy_time_t time;
-
 static uint8_t copy[IMAGE_MAX];
 static size_t copy_size;
 
 void setUp(void)
 {
-    fake_can_reset();
-    time = 0;
+    fake_loop_start(&exchange_app);
     memset(&exchange_seen, 0, sizeof exchange_seen);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
     /* Buffers as they are when the program starts, so that no test lives on what another one has left. */
     memset(exchange_image.state, 0, sizeof *exchange_image.state);
     TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == 0u);
@@ -202,11 +182,7 @@ static void cycle(void)
 
     *frame = (canopy_can_frame_t){.id = CLIMATE_ID, .length = 2};
     frame->data[0] = (uint8_t)(temperature & 0xFFu);
-    fake.rx_count = 1;
-    fake.rx_taken = 0;
-    fake.tx_count = 0;
-    time += PERIOD_US;
-    (void)canopy_loop_cycle(&loop, time);
+    (void)fake_loop_cycle(1);
 }
 
 typedef struct {

@@ -2,36 +2,16 @@
 /** @file The application "language": subtrees, blackboard entries, scripts, signals as names, nodes of the user's own. */
 #include <string.h>
 
-#include "fake_can.h"
+#include "fake_loop.h"
 #include "language_app.h"
 #include "unity.h"
 
-enum { PERIOD_US = 10000, CLIMATE_ID = 0x18FECA15 };
-
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return 0;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
-static const canopy_loop_config_t config = {.app = &language_app, .can = &fake_can, .clock = &fake_clock};
-static canopy_loop_t loop;
-static canopy_time_t time;
+enum { CLIMATE_ID = 0x18FECA15 };
 
 void setUp(void)
 {
-    fake_can_reset();
-    time = 0;
+    fake_loop_start(&language_app);
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(language_app.tree, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
 }
 
 void tearDown(void)
@@ -41,11 +21,7 @@ void tearDown(void)
 /** One cycle without a frame. */
 static void cycle(void)
 {
-    fake.rx_count = 0;
-    fake.rx_taken = 0;
-    fake.tx_count = 0;
-    time += PERIOD_US;
-    (void)canopy_loop_cycle(&loop, time);
+    (void)fake_loop_cycle(0);
 }
 
 /** One cycle with a Climate frame: this raw temperature (0.5 degC, offset 10), this door. */
@@ -57,11 +33,7 @@ static void cycle_with(int16_t raw, uint8_t door)
     frame->data[0] = (uint8_t)((uint16_t)raw >> 8);
     frame->data[1] = (uint8_t)((uint16_t)raw & 0xFFu);
     frame->data[2] = (uint8_t)(door | (0x1Du << 3)); /* Temperature2: -3 in 5 bits, that is 2 * -3 + 1 = -5 */
-    fake.rx_count = 1;
-    fake.rx_taken = 0;
-    fake.tx_count = 0;
-    time += PERIOD_US;
-    (void)canopy_loop_cycle(&loop, time);
+    (void)fake_loop_cycle(1);
 }
 
 static void subtrees_have_entries_of_their_own(void)
@@ -91,7 +63,7 @@ static void the_programs_own_entries_begin_with_their_defaults(void)
     TEST_ASSERT_EQUAL_INT8(1, language_entries->mode);
     TEST_ASSERT_TRUE(language_entries->every_second);
     language_entries->attempts = 9;
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     TEST_ASSERT_EQUAL_INT32(2, language_entries->attempts);
 }
 
@@ -113,14 +85,14 @@ static void signals_are_compared_in_physical_units(void)
     cycle_with(0, 0);
     TEST_ASSERT_EQUAL_UINT16(100, language_output->fan.speed);
     /* 10.5 is not, and the door is shut: the sequence writes. */
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     cycle_with(1, 0);
     TEST_ASSERT_EQUAL_UINT16(123, language_output->fan.speed);
     TEST_ASSERT_EQUAL_UINT8(LANGUAGE_FAN_MODE_LOW_NOISE, language_output->fan.mode);
     TEST_ASSERT_FALSE(language_output->fan.turbo);
     TEST_ASSERT_EQUAL_INT8(-100, language_output->fan.trim);
     /* 20.0 with the door open. */
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     cycle_with(20, 2);
     TEST_ASSERT_EQUAL_UINT16(100, language_output->fan.speed);
 }
@@ -137,7 +109,7 @@ static void fixed_point_is_counted_in_steps(void)
     TEST_ASSERT_EQUAL_UINT16(50, language_output->fan.ticks);
     TEST_ASSERT_EQUAL_UINT32(0, language_entries->script_faults);
     /* What does not fit is limited, and counted: 10 * 327.67 - 0.1 in steps of 0.1 is above 12.7. */
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     language_entries->gain = INT16_MAX;
     cycle();
     TEST_ASSERT_EQUAL_INT16(INT16_MAX, language_entries->gain);
@@ -159,7 +131,7 @@ static void a_switch_takes_the_case_that_matches(void)
     static const int32_t chosen[] = {1, 2, 3, 4};
 
     for (unsigned which = 0; which < 4; which++) {
-        TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+        TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
         language_entries->mode = modes[which];
         cycle();
         TEST_ASSERT_EQUAL_INT32(chosen[which], language_entries->chosen);
@@ -206,7 +178,7 @@ static void a_loop_takes_the_items_of_an_entry(void)
         TEST_ASSERT_EQUAL_UINT16(tick < 3u ? 2u - tick : 0u, language_entries->queue.count);
     }
     /* A count beyond the capacity is limited, and counted. */
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     cycle();
     language_entries->queue.count = 9;
     cycle();
@@ -219,7 +191,7 @@ static void updates_are_counted_where_a_node_waits_for_them(void)
     cycle();
     TEST_ASSERT_EQUAL_INT32(5 + 3, language_entries->copy);
     TEST_ASSERT_EQUAL_INT32(0, language_entries->seen);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     language_entries->mode_updates++;
     cycle();
     TEST_ASSERT_EQUAL_INT32(1, language_entries->seen);
