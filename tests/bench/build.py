@@ -60,19 +60,23 @@ def host_program(target: Target, folder: Path) -> Path:
     return path
 
 
-def bare_program(target: Target, folder: Path) -> Path:
-    """The workloads and the engine for a Cortex-M core: no start-up code, functions are called by name.
+def link_bare(target: Target, path: Path, *sources: str | Path) -> Path:
+    """A program for a Cortex-M core without start-up code, whose functions are called by name.
 
-    Code at 0, data at 0x20000000.
+    Code at 0, data at 0x20000000. `sources` may hold options too.
     """
-    path = folder / f"workloads_{target.name.replace(' ', '_')}.elf"
     # -fno-…: memset() must not become a call of itself.
     library = (LIBC / "string.c", "-fno-tree-loop-distribute-patterns", "-lgcc")
     link = ("-nostdlib", "-Wl,-e,canopy_tree_tick", "-Wl,-Ttext=0", "-Wl,-Tdata=0x20000000")
-    engine = engine_object(target, folder)
-    sources = (HERE / "workloads.c", HERE / "stack.c", VALIDATOR)
-    run(*target.command, *COMMON, *link, *sources, engine, *library, "-o", path)
+    run(*target.command, *COMMON, *link, *sources, *library, "-o", path)
     return path
+
+
+def bare_program(target: Target, folder: Path) -> Path:
+    """The workloads and the engine for a Cortex-M core."""
+    engine = engine_object(target, folder)
+    sources = (HERE / "workloads.c", HERE / "stack.c", VALIDATOR, engine)
+    return link_bare(target, folder / f"workloads_{target.name.replace(' ', '_')}.elf", *sources)
 
 
 def text_bytes(target: Target, path: Path) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Counts a tick's instructions and stack on an emulated Cortex-M4 (unicorn)."""
+"""Counts instructions and stack on an emulated Cortex-M4 (unicorn)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +25,7 @@ class Tick:
 
 
 class Core:
-    """A core with a program of build.bare_program() in its memory."""
+    """A core with a program of build.link_bare() in its memory."""
 
     def __init__(self, program: Path) -> None:
         self._machine = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
@@ -69,6 +69,23 @@ class Core:
         for hook in hooks:
             self._machine.hook_del(hook)
         return Tick(instructions, self._word("bench_leaf_calls") - calls, STACK_TOP - lowest)
+
+    def count(self, function: str, *arguments: int) -> tuple[int, int]:
+        """Calls a function with arguments of 32 bit, four at most. Returns its result, and the instructions it took."""
+        instructions = 0
+
+        def step(_machine: unicorn.Uc, _address: int, _size: int, _data: object) -> None:
+            nonlocal instructions
+            instructions += 1
+
+        hook = self._machine.hook_add(unicorn.UC_HOOK_CODE, step)
+        result = self._call(function, *arguments)
+        self._machine.hook_del(hook)
+        return result, instructions
+
+    def address(self, symbol: str) -> int:
+        """Where a variable lies."""
+        return self._symbols[symbol]
 
     def build_stack(self, node_type: int, asked: bool) -> int:
         """Calls bench_stack_build(). Returns the number of nodes."""

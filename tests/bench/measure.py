@@ -11,7 +11,7 @@ from typing import Any
 
 from canopy.compiler.node_types import node_types
 
-from . import build, cortex_m, instructions
+from . import build, cortex_m, image, instructions
 
 # Workload and n. Instructions per leaf on this machine.
 HOST_ROWS = [
@@ -107,6 +107,12 @@ def tick_stack(program: Path, workload: str, n: int) -> int:
     return max(core.tick(number * 2000, count=False).stack for number in range(3))
 
 
+def _images(folder: Path, say: Progress) -> dict[str, Any]:
+    say("loading tree images")
+    generated = image.generate(folder)
+    return {target.name: image.measure(target, generated, folder) for target in build.CORTEX_M4}
+
+
 def _memory(folder: Path) -> dict[str, Any]:
     program = build.host_program(build.HOSTS[0], folder)
     objects = {
@@ -150,6 +156,7 @@ def measure(say: Progress) -> dict[str, Any]:
             "machine": platform.machine(),
             "host": _host(folder, say),
             "cortex_m4": _cortex(folder, say),
+            "images": _images(folder, say),
             "memory": _memory(folder),
             "peers": _peers(folder, say),
         }

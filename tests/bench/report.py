@@ -78,6 +78,14 @@ def _stack(results: dict[str, Any]) -> str:
     return _table(["stack of a tick [bytes]", *columns], rows)
 
 
+def _images(columns: dict[str, Any]) -> str:
+    rows = []
+    for name, image in next(iter(columns.values())).items():
+        counts = [f"{column[name]['instructions']:,}" for column in columns.values()]
+        rows.append([f"tree image of {image['nodes']} nodes, {image['bytes']} bytes", *counts])
+    return _table(["instructions of canopy_image_load()", *columns], rows)
+
+
 def _memory(memory: dict[str, Any]) -> str:
     sizes = memory["sizes"]
     outside = sorted({symbol for symbols in memory["calls_outside"].values() for symbol in symbols})
@@ -111,5 +119,6 @@ def _peers(peers: dict[str, Any]) -> str:
 
 
 def markdown(results: dict[str, Any]) -> str:
-    """The four tables."""
-    return "\n\n".join((_instructions(results), _stack(results), _memory(results["memory"]), _peers(results["peers"])))
+    """The five tables."""
+    tables = (_instructions(results), _stack(results), _images(results["images"]), _memory(results["memory"]))
+    return "\n\n".join((*tables, _peers(results["peers"])))

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bench import build, instructions, measure, report
+from bench import build, image, instructions, measure, report
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +107,11 @@ def test_no_node_type_takes_more_stack_than_promised(tmp_path: Path) -> None:
         assert max(stacks.values()) <= 160, (target.name, stacks)
 
 
+def test_loading_an_image_is_counted(tmp_path: Path) -> None:
+    images = image.measure(build.CORTEX_M4[1], image.generate(tmp_path), tmp_path)
+    assert all(found["instructions"] > 8 * found["bytes"] for found in images.values()), "the CRC takes each bit"
+
+
 def test_tables_have_a_cell_for_everything() -> None:
     column = {
         "per_leaf": {"sequence 100": 22.0, "inverters 60000": 60001.0},
@@ -121,6 +126,7 @@ def test_tables_have_a_cell_for_everything() -> None:
             "machine": "x86_64",
             "host": {"gcc": column},
             "cortex_m4": {"cortex-m4 -O2": column},
+            "images": {"cortex-m4 -O2": {"main": {"nodes": 22, "bytes": 872, "instructions": 53201}}},
             "memory": memory,
             "peers": {
                 "Canopy": {
@@ -132,5 +138,5 @@ def test_tables_have_a_cell_for_everything() -> None:
         }
     )
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 4
+    assert len(tables) == 5
     assert all(len({line.count("|") for line in table}) == 1 for table in tables)
