@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from canopy.check.registry import Severity, all_rules, table
+from canopy.check.registry import Severity
+from canopy.check.rules import all_rules, table
 from canopy.check.run import check
 from canopy.cli import main
 from canopy.compiler.errors import CompileError

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from canopy.check.registry import Severity, all_rules
+from canopy.check.registry import Severity
+from canopy.check.rules import all_rules
 from canopy.check.run import BusOptions, check
 from canopy.cli import main
 from canopy.compiler.tree_reader import read_tree

@@ -10,7 +10,8 @@ from pathlib import Path
 import click
 
 from canopy.check.output import as_json, as_sarif, print_text
-from canopy.check.registry import Rule, Severity, all_rules, table
+from canopy.check.registry import Rule, Severity
+from canopy.check.rules import all_rules, table
 from canopy.check.run import BusOptions, Report, check
 from canopy.compiler.cli import read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest

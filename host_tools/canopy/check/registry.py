@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a rule is, and the list of all rules. docs/lint.md's table is made from it."""
+"""What a rule is, and the list into which the rules of canopy.check.rules put themselves."""
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
@@ -67,17 +66,3 @@ def rule(rule_id: str, severity: Severity, title: str, *, why: str, way_out: str
         return run
 
     return register
-
-
-def all_rules() -> dict[str, Rule]:
-    """Every rule by its id, in the order of the documentation."""
-    importlib.import_module("canopy.check.rules")  # the rules register themselves, and they need this module
-    return RULES
-
-
-def table() -> str:
-    """The table of docs/lint.md."""
-    lines = ["| rule | severity | what it finds | why it matters | way out |", "|---|---|---|---|---|"]
-    for known in all_rules().values():
-        lines.append(f"| `{known.id}` | {known.severity.label} | {known.title} | {known.why} | {known.way_out} |")
-    return "\n".join(lines) + "\n"

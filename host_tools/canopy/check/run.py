@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from canopy.check.facts import Facts, elements_by_place
-from canopy.check.registry import Hit, Rule, all_rules
+from canopy.check.registry import Hit, Rule
+from canopy.check.rules import all_rules
 from canopy.check.rules.declarations import writing_conditions
 from canopy.compiler.emit import load_application
 from canopy.compiler.errors import CompileError, Place, nearest
