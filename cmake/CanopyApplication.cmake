@@ -86,7 +86,7 @@ function(canopy_add_application NAME)
     VERBATIM)
   add_library(${NAME}_application STATIC ${sources} ${headers} ${APP_LEAVES})
   target_include_directories(${NAME}_application PUBLIC "${folder}" "${CMAKE_CURRENT_SOURCE_DIR}")
-  target_link_libraries(${NAME}_application PUBLIC canopy_runtime PRIVATE canopy_warnings)
+  target_link_libraries(${NAME}_application PUBLIC canopy_runtime PRIVATE $<TARGET_NAME_IF_EXISTS:canopy_warnings>)
 endfunction()
 
 function(canopy_add_image NAME)
