@@ -27,9 +27,10 @@ HEADER = """\
  *
  * "@ node children parameters..." begins a node. A parameter is
  *   a number     as in nodes.def; -1 in the place of a script: there is none
- *   ?0,1,2       a script that is asked: its answers. S F R K: done with that status, for functions of the user's own
+ *   ?0,1,2       a script that is asked: its answers
  *   !            a script that is run; what it gives is of no account
- * A Control or Decorator of the user's own has its functions enter, child and halt instead.
+ * A Control or Decorator of the user's own has its functions enter, child and halt instead. They answer: S F R K, done
+ * with that status (I is none); 1, 2, ... tick that child; N tick the next one, after the last one done with RUNNING.
  *
  * Its rows are the node's behaviour as a machine with states; 0 is the start.
  * "state | children return ? scripts answer | node returns | calls | next state"
