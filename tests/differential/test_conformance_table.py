@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The conformance table in the reference model: two programs that were made from docs/semantics.md, by two hands.
 
-Left out is what the reference model does not know: parameters that an entry gives, TestNode, nodes of the user's own, and
-canopy_tree_reset().
+Left out is what the reference model does not know: parameters that an entry gives, TestNode, nodes of the user's own,
+and canopy_tree_reset().
 """
 
 from __future__ import annotations

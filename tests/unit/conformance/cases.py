@@ -101,11 +101,9 @@ def scripted_nodes() -> Iterator[Case]:
 
 def attributes() -> Iterator[Case]:
     """All of the 256 sets that a node can have."""
-    questions = [Script((0, true)) for true in (1, 2, -1, 65536)]
-    yield from (
-        Case("Attributes", 1, chosen)
-        for chosen in itertools.product(*((NONE, script) for script in questions), *[(NONE, RUN)] * 4)
-    )
+    scripts: list[Parameter] = [*(Script((0, true)) for true in (1, 2, -1, 65536)), RUN, RUN, RUN, RUN]
+    for given in itertools.product((False, True), repeat=len(scripts)):
+        yield Case("Attributes", 1, tuple(s if is_given else NONE for s, is_given in zip(scripts, given, strict=True)))
 
 
 def leaves() -> Iterator[Case]:
@@ -117,8 +115,9 @@ def leaves() -> Iterator[Case]:
     yield Case("WasEntryUpdated", 0, (Script((0, 1, 65536)),))
     for status, milliseconds in itertools.product((S, F, K), (0, 1, 2)):
         yield Case("TestNode", 0, (status, milliseconds, RUN, RUN, RUN))
-    for status, chosen in itertools.product((S, F, K), itertools.product((NONE, RUN), repeat=3)):
-        yield Case("TestNode", 0, (status, 0, *chosen))
+    either: tuple[Parameter, ...] = (NONE, RUN)
+    for status, *scripts in itertools.product((S, F, K), either, either, either):
+        yield Case("TestNode", 0, (status, 0, *scripts))
 
 
 def own_nodes() -> Iterator[Case]:

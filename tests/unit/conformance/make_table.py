@@ -34,15 +34,15 @@ HEADER = """\
  *
  * Its rows are the node's behaviour as a machine with states; 0 is the start.
  * "state | children return ? scripts answer | node returns | calls | next state"
- *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; - no children; or halt
- *                    or reset, with :letters when a child is asked then
+ *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; - no children; or
+ *                    halt or reset, with :letters when a child is asked then
  *   scripts answer   in the order in which they are asked; nothing when none is
  *   node returns     F! a fault is counted, too
  *   calls            in order: a ticked, a' ticked while it is RUNNING, a! halted; A the script of the first parameter
  *                    asked or run, B of the second; - none. Of a node of the user's own: E enter, E' enter while it is
  *                    RUNNING, C child, H halt
- * One row is one millisecond. Every path of rows is a test: so the rows hold every combination of statuses and answers for
- * any number of ticks, and what is not asked for is not written out for each that it could be.
+ * One row is one millisecond. Every path of rows is a test: so the rows hold every combination of statuses and answers
+ * for any number of ticks, and what is not asked for is not written out for each that it could be.
  */
 """
 

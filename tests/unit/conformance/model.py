@@ -3,7 +3,8 @@
 
 Written from the text alone, without a look at the engine, so that a misreading would have to be made twice. A child
 is a StatefulAction that returns what the table says. Here are the nodes that have no scripts of their own; their
-parameters may come from entries. The others are in scripted_model.py.
+parameters may come from entries. (When these are looked at was in no text: that was taken from the engine, and written
+down.) The other nodes are in scripted_model.py.
 """
 
 from __future__ import annotations

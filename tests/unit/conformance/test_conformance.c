@@ -108,14 +108,14 @@ void tearDown(void)
 /** The next answer that the row has; an upper-case letter stands for itself. */
 static int32_t take_answer(void)
 {
-    int32_t answer = *next_answer;
+    int32_t answer;
 
     if (*next_answer != '?' && *next_answer != ',') {
         TEST_FAIL_MESSAGE(current->text);
     }
     next_answer++;
     if (*next_answer >= 'A' && *next_answer <= 'Z') {
-        answer = *next_answer++;
+        answer = (unsigned char)*next_answer++;
     } else {
         next_answer = read_number(next_answer, &answer);
     }
