@@ -53,7 +53,7 @@ class Bodies:
 
     @staticmethod
     def _guard(compiler: Compiler, otherwise: int) -> list[str]:
-        """A script that reads a stale signal answers `otherwise`, without being run, unless it asks for .fresh itself."""
+        """A script that reads a stale signal is not run, but answers `otherwise`; not if it asks for .fresh itself."""
         stale = [message for name, message in compiler.used.items() if name not in compiler.tested]
         flags = sorted(f"app->input.{message.c_name}.fresh" for message in stale)
         flags += sorted(compiler.parts)
