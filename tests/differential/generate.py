@@ -217,7 +217,7 @@ class Generator:
         rng = self._rng
         count = len(children)
         if name in ("success_count", "failure_count", "max_failures"):
-            if kind == "ReactiveParallel" or rng.random() < 0.6:
+            if rng.random() < 0.6:
                 return rng.randint(1, count)
             return -rng.randint(1, count)  # from N + 1 down: N to 1
         if name in ("num_cycles", "num_attempts"):

@@ -138,6 +138,18 @@ static void a_switch_takes_the_case_that_matches(void)
     }
 }
 
+static void a_switch_over_a_stale_signal_takes_the_default(void)
+{
+    cycle();
+    TEST_ASSERT_EQUAL_INT32(3, language_entries->seen_door);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    cycle_with(0, 0);
+    TEST_ASSERT_EQUAL_INT32(1, language_entries->seen_door);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    cycle_with(0, 2);
+    TEST_ASSERT_EQUAL_INT32(2, language_entries->seen_door);
+}
+
 static void texts_are_places_in_a_table(void)
 {
     cycle_with(0, 0);
@@ -247,6 +259,7 @@ int main(void)
     RUN_TEST(fixed_point_is_counted_in_steps);
     RUN_TEST(scripts_that_read_stale_signals_are_false);
     RUN_TEST(a_switch_takes_the_case_that_matches);
+    RUN_TEST(a_switch_over_a_stale_signal_takes_the_default);
     RUN_TEST(texts_are_places_in_a_table);
     RUN_TEST(leaves_write_texts_and_queues_of_texts);
     RUN_TEST(a_loop_takes_one_item_a_tick);

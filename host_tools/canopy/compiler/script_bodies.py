@@ -19,6 +19,11 @@ def entry_value(script: Script) -> Entry | SignalName | str:
     return script.text if name is None else script.scope.resolve(name, script.place())
 
 
+def _cases(script: Script) -> int:
+    """How many cases a Switch has; that is the place of its default, too."""
+    return sum(name.startswith("case_") for name in script.element.attributes)
+
+
 class Bodies:
     """Compiles scripts. `indices`: the place of each node (by its id()) in the node table."""
 
@@ -44,18 +49,18 @@ class Bodies:
             lines = self._parameter(compiler, script)
         else:
             lines = self._set(compiler, script)
-        return (*self._guard(compiler), *lines)
+        return (*self._guard(compiler, _cases(script) if script.role == "switch" else 0), *lines)
 
     @staticmethod
-    def _guard(compiler: Compiler) -> list[str]:
-        """A script that reads a stale signal is not run, unless it asks for .fresh itself."""
+    def _guard(compiler: Compiler, otherwise: int) -> list[str]:
+        """A script that reads a stale signal is not run, but answers `otherwise`; not if it asks for .fresh itself."""
         stale = [message for name, message in compiler.used.items() if name not in compiler.tested]
         flags = sorted(f"app->input.{message.c_name}.fresh" for message in stale)
         flags += sorted(compiler.parts)
         if not flags:
             return []
         tests = " || ".join(f"!{flag}" for flag in flags)
-        return [f"if ({tests}) {{", "    return 0;", "}"]
+        return [f"if ({tests}) {{", f"    return {otherwise};", "}"]
 
     def _statements(self, compiler: Compiler, script: Script, statements: tuple[Expression, ...]) -> list[str]:
         lines = [line for statement in statements[:-1] for line in compiler.statement(statement)]
@@ -74,9 +79,9 @@ class Bodies:
 
     def _switch(self, compiler: Compiler, script: Script) -> list[str]:
         value = self._value(compiler, script, script.text, "variable")
-        cases = [name for name in script.element.attributes if name.startswith("case_")]
         lines: list[str] = []
-        for place, attribute in enumerate(sorted(cases)):
+        for place in range(_cases(script)):
+            attribute = f"case_{place + 1}"
             text = script.element.attributes[attribute]
             case = self._value(compiler, script, text, attribute)
             if isinstance(value, TextVar) or (isinstance(value, Num) and value.choices and isinstance(case, TextConst)):
@@ -87,7 +92,7 @@ class Bodies:
                     return [*lines, f"return {place};"]
                 continue
             lines += [f"if {answer.c if answer.c.startswith('(') else f'({answer.c})'} {{", f"    return {place};", "}"]
-        return [*lines, f"return {len(cases)};"]
+        return [*lines, f"return {_cases(script)};"]
 
     def _take(self, compiler: Compiler, script: Script) -> list[str]:
         assert isinstance(script.target, Entry)

@@ -174,8 +174,9 @@ class ReactiveParallel(Node):
 
     def tick_children(self) -> int:
         statuses = [child.tick() for child in self.children]
-        enough = self.spec.parameters[0]
         counted = len(statuses) - statuses.count(SKIPPED)
+        written = self.spec.parameters[0]
+        enough = max(written if written >= 0 else counted + 1 + written, 1)
         if counted == 0:
             self.reset_all()
             return SKIPPED

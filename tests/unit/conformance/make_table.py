@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes conformance_table.inc from model.py; with --check, says whether the file is what would be written.
+"""Writes conformance_table.inc from the model; with --check, says whether the file is what would be written.
 
 PYTHONPATH=tests python -m unit.conformance.make_table [--check]
 """
@@ -8,143 +8,150 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from unit.conformance import model
+from unit.conformance import model, scripted_model
+from unit.conformance.cases import Case, cases, left_out
+from unit.conformance.node import Answer, Node, Parameter, Script
 
 TABLE = Path(__file__).with_name("conformance_table.inc")
-STATUSES = "SFRK"
+NODES = Path(__file__).parents[3] / "runtime/include/canopy/nodes.def"
 
 HEADER = """\
 /* SPDX-License-Identifier: MIT */
 /*
- * Conformance table: what every control node and decorator without scripts does. Made by make_table.py from model.py,
- * which is docs/semantics.md as a program; do not edit. test_conformance.c walks it.
+ * Conformance table: what every control node, decorator and built-in leaf does. Made by make_table.py from model.py and
+ * scripted_model.py, which are docs/semantics.md as a program; do not edit. test_conformance.c walks it.
  *
- * "@ node children parameters..." begins a node. Its rows are the node's behaviour as a machine with states; 0 is the
- * start. "state | children return | node returns | calls | next state"
- *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; or halt or reset,
- *                    with :letters when a child is asked then
- *   calls            in order: a ticked, a' ticked while it is RUNNING, a! halted; - none
- * One row is one millisecond. Every path of rows is a test: so the rows hold every combination of statuses for any
- * number of ticks, and a status that is not asked for is not written out four times.
+ * "@ node children parameters..." begins a node. A parameter is
+ *   a number     as in nodes.def; -1 in the place of a script: there is none
+ *   ?0,1,2       a script that is asked: its answers
+ *   !            a script that is run; what it gives is of no account
+ * A Control or Decorator of the user's own has its functions enter, child and halt instead. They answer: S F R K, done
+ * with that status (I is none); 1, 2, ... tick that child; N tick the next one, after the last one done with RUNNING.
+ *
+ * Its rows are the node's behaviour as a machine with states; 0 is the start.
+ * "state | children return ? scripts answer | node returns | calls | next state"
+ *   children return  one letter a child: S success, F failure, R running, K skipped, . not asked; - no children; or
+ *                    halt or reset, with :letters when a child is asked then
+ *   scripts answer   in the order in which they are asked; nothing when none is
+ *   node returns     F! a fault is counted, too
+ *   calls            in order: a ticked, a' ticked while it is RUNNING, a! halted; A the script of the first parameter
+ *                    asked or run, B of the second; - none. Of a node of the user's own: E enter, E' enter while it is
+ *                    RUNNING, C child, H halt
+ * One row is one millisecond. Every path of rows is a test: so the rows hold every combination of statuses and answers
+ * for any number of ticks, and what is not asked for is not written out for each that it could be.
  */
 """
 
 
-def cases() -> Iterator[tuple[str, int, tuple[int, ...]]]:
-    """Every node with its numbers of children and its parameters."""
-    for name in ("Sequence", "SequenceWithMemory", "AsyncSequence", "ReactiveSequence"):
-        yield from ((name, children, ()) for children in (1, 2, 3))
-    for name in ("Fallback", "AsyncFallback", "ReactiveFallback"):
-        yield from ((name, children, ()) for children in (1, 2, 3))
-    for children, counts in (
-        (1, (-1, 1)),
-        (2, (-1, 1)),
-        (2, (1, 2)),
-        (3, (-1, 1)),
-        (3, (2, 2)),
-        (3, (1, -1)),
-        (3, (-2, 3)),
-    ):
-        yield "Parallel", children, counts
-    for children, most in ((1, 1), (2, 1), (3, 1), (3, 2), (3, -1)):
-        yield "ParallelAll", children, (most,)
-    for children, needed in ((1, 1), (2, 1), (2, 2), (3, 1), (3, 2), (3, 3), (3, -1)):
-        yield "ReactiveParallel", children, (needed,)
-    for name in ("IfThenElse", "WhileDoElse"):
-        yield from ((name, children, ()) for children in (2, 3))
-    yield from (("TryCatch", children, (catch_on_halt,)) for catch_on_halt in (0, 1) for children in (2, 3))
-    for name in ("Inverter", "ForceSuccess", "ForceFailure", "KeepRunningUntilFailure"):
-        yield name, 1, ()
-    for name in ("Repeat", "RetryUntilSuccessful"):
-        yield from ((name, 1, (most,)) for most in (-1, 0, 1, 2, 3))
-    for name in ("Delay", "Timeout"):
-        yield from ((name, 1, (milliseconds,)) for milliseconds in (0, 1, 2))
-    yield from (("RunOnce", 1, (then_skip,)) for then_skip in (0, 1))
+@dataclass(frozen=True)
+class Step:
+    """A tick, a halt or a reset, with what the node is answered in it, in the order in which it asks."""
+
+    operation: str
+    answers: tuple[Answer, ...] = ()
 
 
 class NotAnsweredError(Exception):
-    """The node asks for one more child than has been answered."""
+    """The node asks for one more thing than has been answered."""
+
+    def __init__(self, options: Sequence[Answer]) -> None:
+        """Keep what it may be answered."""
+        super().__init__()
+        self.options = options
 
 
-def start(name: str, children: int, parameters: tuple[int, ...]) -> model.Node:
+def start(case: Case) -> Node:
     """A fresh node."""
-    kind: type[model.Node] = getattr(model, name)
-    return kind(children, *parameters)
+    kind: type[Node] = getattr(model, case.name, None) or getattr(scripted_model, case.name)
+    return kind(case.children, *case.parameters)
 
 
-def operation_of(step: str) -> str:
-    """Of "haltS": halt. Of a tick: nothing."""
-    return step.rstrip(STATUSES)
-
-
-def answers_of(step: str) -> str:
-    """Of "haltS": S."""
-    return step[len(operation_of(step)) :]
-
-
-def replay(fresh: model.Node, steps: list[str]) -> tuple[model.Node, list[int]]:
-    """Take the steps; also which children the last one asked, in order."""
-    asked: list[int] = []
+def replay(case: Case, steps: Sequence[Step]) -> tuple[Node, list[str]]:
+    """Take the steps; also the letters of what the last one asked, in order."""
+    node = start(case)
+    asked: list[str] = []
     for step in steps:
         asked = []
-        answers = iter(answers_of(step))
+        answers = iter(step.answers)
 
-        def answer(child: int, answers: Iterator[str] = answers, asked: list[int] = asked) -> str:
-            asked.append(child)
+        def answer(
+            letter: str, options: Sequence[Answer], answers: Iterator[Answer] = answers, asked: list[str] = asked
+        ) -> Answer:
+            asked.append(letter)
             try:
                 return next(answers)
             except StopIteration:
-                raise NotAnsweredError from None
+                raise NotAnsweredError(options) from None
 
-        {"": fresh.tick, "halt": fresh.halt, "reset": fresh.reset}[operation_of(step)](answer)
-    return fresh, asked
+        {"tick": node.tick, "halt": node.halt, "reset": node.reset}[step.operation](answer)
+    return node, asked
 
 
-def rows(name: str, children: int, parameters: tuple[int, ...]) -> Iterator[str]:
-    """The machine, breadth first. A step of a tick is the answers in the order in which children are asked."""
-    numbers: dict[tuple[object, ...], int] = {start(name, children, parameters).state(): 0}
-    histories: list[list[str]] = [[]]
+def shown(case: Case, step: Step, asked: Sequence[str]) -> str:
+    """The step in a row: what each child returns, and what the scripts answer."""
+    answered = dict(zip(asked, step.answers, strict=True))
+    children = [chr(ord("a") + child) for child in range(case.children)]
+    text = "".join(str(answered.get(child, ".")) for child in children) or "-"
+    if step.operation != "tick":
+        text = f"{step.operation}:{text}" if any(child in answered for child in children) else step.operation
+    scripts = [str(answer) for letter, answer in zip(asked, step.answers, strict=True) if letter.isupper()]
+    return f"{text}?{','.join(scripts)}" if scripts else text
+
+
+def rows(case: Case) -> Iterator[str]:
+    """The machine, breadth first."""
+    numbers: dict[tuple[object, ...], int] = {start(case).state(): 0}
+    histories: list[list[Step]] = [[]]
     for number in itertools.count():
         if number == len(histories):
             return
-        waiting = ["", "halt", "reset"]
+        waiting = [Step("tick"), Step("halt"), Step("reset")]
         while waiting:
             step = waiting.pop(0)
             try:
-                node, asked = replay(start(name, children, parameters), [*histories[number], step])
-            except NotAnsweredError:
-                waiting[:0] = [step + status for status in STATUSES]
+                node, asked = replay(case, [*histories[number], step])
+            except NotAnsweredError as more:
+                waiting[:0] = [Step(step.operation, (*step.answers, option)) for option in more.options]
                 continue
             if node.state() not in numbers:
                 numbers[node.state()] = len(histories)
                 histories.append([*histories[number], step])
-            answered = dict(zip(asked, answers_of(step), strict=True))
-            letters = "".join(answered.get(child, ".") for child in range(children))
-            operation = operation_of(step)
-            shown = f"{operation}:{letters}" if operation and answered else operation or letters
-            yield f"{number} | {shown} | {node.status} | {node.calls or '-'} | {numbers[node.state()]}"
+            status = node.status + ("!" if node.fault else "")
+            yield f"{number} | {shown(case, step, asked)} | {status} | {node.calls or '-'} | {numbers[node.state()]}"
+
+
+def parameter_text(parameter: Parameter) -> str:
+    """A parameter in the line that begins a node."""
+    if not isinstance(parameter, Script):
+        return str(parameter)
+    return f"?{','.join(map(str, parameter.answers))}" if parameter.answers else "!"
 
 
 def table() -> str:
     """The whole file."""
     lines = [HEADER]
-    for name, children, parameters in cases():
-        lines.append(f'"@ {" ".join([name, str(children), *map(str, parameters)])}",\n')
-        lines.extend(f'"{row}",\n' for row in rows(name, children, parameters))
+    for case in cases():
+        lines.append(f'"@ {" ".join([case.name, str(case.children), *map(parameter_text, case.parameters)])}",\n')
+        lines.extend(f'"{row}",\n' for row in rows(case))
     return "".join(lines)
 
 
 def main() -> int:
     """Write or check the file."""
+    missing = left_out(NODES.read_text(encoding="utf-8"), cases())
+    if missing:
+        print(f"cases.py has not: {', '.join(missing)}", file=sys.stderr)
+        return 1
     text = table()
     if sys.argv[1:] != ["--check"]:
         TABLE.write_text(text, encoding="utf-8")
         return 0
     if TABLE.read_text(encoding="utf-8") != text:
-        print(f"{TABLE} is not what model.py says: run {Path(__file__).name} and read the difference", file=sys.stderr)
+        print(f"{TABLE} is not what the model says: run {Path(__file__).name} and read the difference", file=sys.stderr)
         return 1
     return 0
 
