@@ -142,10 +142,10 @@ static void a_switch_over_a_stale_signal_takes_the_default(void)
 {
     cycle();
     TEST_ASSERT_EQUAL_INT32(3, language_entries->seen_door);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     cycle_with(0, 0);
     TEST_ASSERT_EQUAL_INT32(1, language_entries->seen_door);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
     cycle_with(0, 2);
     TEST_ASSERT_EQUAL_INT32(2, language_entries->seen_door);
 }
