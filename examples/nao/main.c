@@ -152,8 +152,8 @@ static void print_summary(const canopy_can_t *can)
         printf("%s: %" PRIu32 " ticks replayed\n", CANOPY_APP.name, loop.ticks);
     } else {
         printf("%s: %" PRIu32 " ticks, %" PRIu32 " overruns, %" PRIu32 " slips, longest cycle %" PRIu64
-           " us, most late %" PRIu64 " us\n",
-           CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
+               " us, most late %" PRIu64 " us\n",
+               CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
     }
     printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32 "; sent %" PRIu32
            ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",

@@ -20,7 +20,7 @@ from click.testing import CliRunner
 
 from canopy.canbus import open_bus
 from canopy.cli import main
-from canopy.trace import Status
+from canopy.trace import Health, Status
 from integration import logs, missions
 from integration.sim_peers import Simulator
 from integration.trace_source import TraceSource, to_message, write_model
@@ -113,7 +113,7 @@ def run_mission(build_dir: Path, bus: str, name: str, output: Path) -> tuple[dic
                 observer.wait_for(lambda: observer.views[-1].root_status == Status.FAILURE, 60)
                 for bad in (logs.frame(0x100, b"\x01"), logs.frame(0x110, bytes(8)), logs.frame(0x123, b"abc")):
                     noise.send(bad)
-                observer.wait_for(lambda: (observer.trace.health or missions.Health()).rx_rejected >= 2, 60)
+                observer.wait_for(lambda: (observer.trace.health or Health()).rx_rejected >= 2, 60)
                 with Simulator(bus, *start) as second:
                     observer.wait_for(lambda: observer.views[-1].root_status == Status.RUNNING, 60)
                     observer.wait_for(lambda: has_gone_on(2), 60)

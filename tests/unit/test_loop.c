@@ -6,7 +6,16 @@
 #include "fake_can.h"
 #include "unity.h"
 
-enum { NODES = 13, PERIOD_US = 1000, TICK_ID = 0x600, CHANGE_ID = 0x601, SNAPSHOT_ID = 0x602, HEALTH_ID = 0x603, INPUTS_ID = 0x604, MODEL_ID = 0x605 };
+enum {
+    NODES = 13,
+    PERIOD_US = 1000,
+    TICK_ID = 0x600,
+    CHANGE_ID = 0x601,
+    SNAPSHOT_ID = 0x602,
+    HEALTH_ID = 0x603,
+    INPUTS_ID = 0x604,
+    MODEL_ID = 0x605
+};
 
 /* --- an application by hand: a ReactiveFallback over twelve conditions -------------------------------------------- */
 
@@ -20,7 +29,8 @@ static canopy_status_t leaf_tick(void *application, uint16_t parameter)
 }
 
 static const canopy_leaf_t leaves[] = {{.tick = leaf_tick}};
-static const canopy_tree_t tree = {.nodes = nodes, .leaves = leaves, .node_count = NODES, .leaf_count = 1, .hash = 0x14BD7221};
+static const canopy_tree_t tree = {
+    .nodes = nodes, .leaves = leaves, .node_count = NODES, .leaf_count = 1, .hash = 0x14BD7221};
 
 static void reset_output(void *output)
 {

@@ -119,9 +119,9 @@ static void test_what_cannot_be_opened_says_why(void)
     append(tick, sizeof tick);
     (void)snprintf(sent, sizeof sent, "%s/none/sent", folder);
     expect_refused(CANOPY_ERROR_IO, sent);
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED,
-                      canopy_replay_open(&files, record, NULL, (canopy_trace_id_t){.id = CANOPY_TRACE_OFF}, message,
-                                         sizeof message));
+    TEST_ASSERT_EQUAL(
+        CANOPY_ERROR_UNSUPPORTED,
+        canopy_replay_open(&files, record, NULL, (canopy_trace_id_t){.id = CANOPY_TRACE_OFF}, message, sizeof message));
     TEST_ASSERT_NOT_NULL(strstr(message, "CanopyInputs"));
 }
 
@@ -142,8 +142,7 @@ static void test_a_full_disk_is_told(void)
     const canopy_can_frame_t frame = {.id = 1};
 
     append(tick, sizeof tick);
-    TEST_ASSERT_EQUAL(CANOPY_OK,
-                      canopy_replay_open(&files, record, "/dev/full", inputs, message, sizeof message));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_open(&files, record, "/dev/full", inputs, message, sizeof message));
     TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, &frame)); /* into the buffer */
     TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_close(&files));
 }
