@@ -2,7 +2,7 @@
 /**
  * @file
  * The controller as a program on a Linux desk: the same application as in the firmware, on SocketCAN or a unixbus,
- * in real time or in lock-step with the simulator. CANOPY_APP names the application; the build sets it.
+ * in real time, in lock-step with the simulator, or as the replay of a record. CANOPY_APP names the application; the build sets it.
  */
 #include <getopt.h>
 #include <inttypes.h>
@@ -13,6 +13,7 @@
 #include "canopy/can/open.h"
 #include "canopy/clock/lockstep.h"
 #include "canopy/clock/posix.h"
+#include "canopy/clock/replay_files.h"
 #include "canopy/loop.h"
 
 #define SIMULATION_STEP_ID 0x700u /* SimulationStep of nao.dbc */
@@ -23,6 +24,8 @@ extern const canopy_app_t CANOPY_APP;
 
 typedef struct {
     const char *can;
+    const char *replay;
+    const char *sent;
     uint32_t ticks; /* 0: until a signal comes */
     bool lock_step;
     bool quiet;
@@ -31,24 +34,30 @@ typedef struct {
 static canopy_can_port_t port;
 static canopy_posix_clock_t posix_clock;
 static canopy_lockstep_t lockstep;
+static canopy_replay_files_t replay;
 static canopy_loop_t loop;
 static options_t options;
 
 static void print_help(FILE *file)
 {
     fprintf(file,
-            "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n\n"
-            "Runs the controller on a CAN bus until SIGINT or SIGTERM.\n\n"
+            "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
+            "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
+            "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
             "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
             "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
             "  --ticks N     end after N ticks\n"
+            "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
+            "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
             "  --quiet       no summary at the end\n"
             "  --help        this text\n\n"
             "Examples:\n"
             "  %s --can socketcan:vcan0\n"
-            "  %s --can unixbus:bus0 --lock-step --ticks 2000\n\n"
-            "Exit status: 0 ended as asked, 1 the bus failed, 2 wrong command line.\n",
-            CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name);
+            "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
+            "  gdb --args %s --replay run.replay\n\n"
+            "Exit status: 0 ended as asked, 1 the bus or a file failed, 2 wrong command line.\n",
+            CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name,
+            CANOPY_APP.name);
 }
 
 static uint32_t parse_ticks(const char *text)
@@ -64,11 +73,31 @@ static uint32_t parse_ticks(const char *text)
     return (uint32_t)value;
 }
 
+static void check(const options_t *given, bool more)
+{
+    const char *wrong = NULL;
+
+    if (more) {
+        wrong = "an argument too many";
+    } else if (given->replay == NULL && given->can == NULL) {
+        wrong = "--can is missing";
+    } else if (given->replay != NULL && (given->can != NULL || given->lock_step || given->ticks != 0u)) {
+        wrong = "--replay takes bus, time and length from the record: leave out --can, --lock-step and --ticks";
+    } else if (given->replay == NULL && given->sent != NULL) {
+        wrong = "--sent goes with --replay";
+    }
+    if (wrong != NULL) {
+        fprintf(stderr, "%s: %s\nSee %s --help.\n", CANOPY_APP.name, wrong, CANOPY_APP.name);
+        exit(EXIT_USAGE);
+    }
+}
+
 static options_t parse(int argc, char **argv)
 {
     static const struct option known[] = {
         {"can", required_argument, NULL, 'c'},   {"lock-step", no_argument, NULL, 'l'},
-        {"ticks", required_argument, NULL, 't'}, {"quiet", no_argument, NULL, 'q'},
+        {"ticks", required_argument, NULL, 't'}, {"replay", required_argument, NULL, 'r'},
+        {"sent", required_argument, NULL, 's'},  {"quiet", no_argument, NULL, 'q'},
         {"help", no_argument, NULL, 'h'},        {NULL, 0, NULL, 0},
     };
     options_t result = {0};
@@ -85,6 +114,12 @@ static options_t parse(int argc, char **argv)
         case 't':
             result.ticks = parse_ticks(optarg);
             break;
+        case 'r':
+            result.replay = optarg;
+            break;
+        case 's':
+            result.sent = optarg;
+            break;
         case 'q':
             result.quiet = true;
             break;
@@ -96,11 +131,7 @@ static options_t parse(int argc, char **argv)
             exit(EXIT_USAGE);
         }
     }
-    if (result.can == NULL || optind != argc) {
-        fprintf(stderr, "%s: %s\nSee %s --help.\n", CANOPY_APP.name,
-                result.can == NULL ? "--can is missing" : "an argument too many", CANOPY_APP.name);
-        exit(EXIT_USAGE);
-    }
+    check(&result, optind != argc);
     return result;
 }
 
@@ -117,42 +148,78 @@ static void print_summary(const canopy_can_t *can)
     canopy_can_stats_t driver;
 
     can->stats(can->context, &driver);
-    printf("%s: %" PRIu32 " ticks, %" PRIu32 " overruns, %" PRIu32 " slips, longest cycle %" PRIu64
-           " us, most late %" PRIu64 " us\n",
-           CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
+    if (options.replay != NULL) { /* its clock measures nothing */
+        printf("%s: %" PRIu32 " ticks replayed\n", CANOPY_APP.name, loop.ticks);
+    } else {
+        printf("%s: %" PRIu32 " ticks, %" PRIu32 " overruns, %" PRIu32 " slips, longest cycle %" PRIu64
+               " us, most late %" PRIu64 " us\n",
+               CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
+    }
     printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32 "; sent %" PRIu32
            ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
            CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, bus->sent,
            bus->tx_dropped, bus->timeouts, CANOPY_APP.tree_instance->faults);
 }
 
+/** A bus with the clock that goes with it, as the options say. @return false: the message says why. */
+static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
+{
+    const atomic_bool *stop = NULL;
+
+    if (options.replay != NULL) {
+        config->can = &replay.replay.can;
+        config->clock = &replay.replay.clock;
+        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace->inputs, message, size) ==
+               CANOPY_OK;
+    }
+    if (canopy_can_open(&port, options.can, NULL, message, size) != CANOPY_OK) {
+        return false;
+    }
+    if (canopy_posix_stop_on_signals(&stop) != CANOPY_OK) {
+        (void)snprintf(message, size, "signals cannot be caught");
+        return false;
+    }
+    canopy_posix_clock_init(&posix_clock, stop);
+    config->can = port.can;
+    config->clock = &posix_clock.clock;
+    if (options.lock_step) {
+        canopy_error_t error = canopy_lockstep_init(&lockstep, port.can, SIMULATION_STEP_ID, stop);
+
+        if (error != CANOPY_OK) {
+            (void)snprintf(message, size, "lock-step: error %d", (int)error);
+            return false;
+        }
+        config->can = &lockstep.can;
+        config->clock = &lockstep.clock;
+    }
+    return true;
+}
+
+/** @return what has gone wrong meanwhile. */
+static canopy_error_t close_bus(void)
+{
+    canopy_error_t error = CANOPY_OK;
+
+    if (options.replay != NULL) {
+        return canopy_replay_close(&replay);
+    }
+    if (options.lock_step) {
+        error = canopy_lockstep_error(&lockstep);
+    }
+    canopy_can_close(&port);
+    return error;
+}
+
 int main(int argc, char **argv)
 {
-    char message[CANOPY_CAN_OPEN_MESSAGE];
-    const atomic_bool *stop = NULL;
+    char message[CANOPY_CAN_OPEN_MESSAGE > CANOPY_REPLAY_MESSAGE ? CANOPY_CAN_OPEN_MESSAGE : CANOPY_REPLAY_MESSAGE];
     canopy_loop_config_t config = {.app = &CANOPY_APP, .after_cycle = after_cycle};
     canopy_error_t error;
 
     options = parse(argc, argv);
-    if (canopy_can_open(&port, options.can, NULL, message, sizeof message) != CANOPY_OK) {
+    if (!open_bus(&config, message, sizeof message)) {
         fprintf(stderr, "%s: %s\n", CANOPY_APP.name, message);
         return EXIT_FAILURE;
-    }
-    if (canopy_posix_stop_on_signals(&stop) != CANOPY_OK) {
-        perror(CANOPY_APP.name);
-        return EXIT_FAILURE;
-    }
-    canopy_posix_clock_init(&posix_clock, stop);
-    config.can = port.can;
-    config.clock = &posix_clock.clock;
-    if (options.lock_step) {
-        error = canopy_lockstep_init(&lockstep, port.can, SIMULATION_STEP_ID, stop);
-        if (error != CANOPY_OK) {
-            fprintf(stderr, "%s: lock-step: error %d\n", CANOPY_APP.name, (int)error);
-            return EXIT_FAILURE;
-        }
-        config.can = &lockstep.can;
-        config.clock = &lockstep.clock;
     }
     error = canopy_loop_init(&loop, &config);
     if (error != CANOPY_OK) {
@@ -163,10 +230,10 @@ int main(int argc, char **argv)
     if (!options.quiet) {
         print_summary(config.can);
     }
-    error = options.lock_step ? canopy_lockstep_error(&lockstep) : CANOPY_OK;
+    error = close_bus();
     if (error != CANOPY_OK) {
-        fprintf(stderr, "%s: the bus %s failed: error %d\n", CANOPY_APP.name, options.can, (int)error);
+        fprintf(stderr, "%s: %s failed: error %d\n", CANOPY_APP.name,
+                options.replay != NULL ? options.replay : options.can, (int)error);
     }
-    canopy_can_close(&port);
     return error == CANOPY_OK ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -66,9 +66,15 @@ class Bridge:
         self._last_frame = 0.0
 
     def feed(self, identifier: int, data: bytes, utime: int) -> None:
-        """Takes one data frame that was received at `utime` [µs since 1970]."""
+        """Takes one data frame that was received at `utime` [µs since 1970].
+
+        Raises:
+            ModelError: The controller says that it runs another tree than the model's.
+        """
         self._last_frame = time.monotonic()
         self._take(self._decoder.feed(identifier, data), utime)
+        if self._decoder.mismatch is not None:
+            raise ModelError(self._decoder.mismatch)
 
     def idle(self) -> None:
         """Call this often: sends what is due, and gives up waiting for frames that no longer come."""

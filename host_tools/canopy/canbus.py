@@ -9,11 +9,18 @@ from __future__ import annotations
 
 import errno
 import logging
+import socket
+import struct
 from typing import Any
 
 import can
+from can.interfaces.socketcan import SocketcanBus
+
+from canopy.unixbus import UnixBus
 
 _INTERFACES = {"socketcan": "socketcan", "unixbus": "canopy"}
+_SO_MEMINFO = 55  # Linux; the socket module has no name for it
+_MEMINFO = struct.Struct("9I")  # the last one: SK_MEMINFO_DROPS
 
 
 class CanBusError(Exception):
@@ -49,6 +56,19 @@ def open_bus(spec: str, **kwargs: Any) -> can.BusABC:
         return can.Bus(interface=_INTERFACES[kind], channel=channel, **kwargs)
     except (OSError, can.CanError, ValueError) as error:
         raise CanBusError(f"cannot open {spec}: {error}{_way_out(kind, channel, error)}") from error
+
+
+def receive_losses(bus: can.BusABC) -> int | None:
+    """Frames that came and were lost because nobody fetched them in time; None where that is not to be known."""
+    if isinstance(bus, UnixBus):
+        return bus.counters["rx_dropped"]
+    if isinstance(bus, SocketcanBus):
+        try:
+            numbers = bus.socket.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size)
+        except OSError:  # Linux before 4.12
+            return None
+        return int(_MEMINFO.unpack(numbers)[-1])
+    return None
 
 
 def is_plain_data(message: can.Message) -> bool:

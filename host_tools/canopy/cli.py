@@ -20,6 +20,8 @@ SUBCOMMANDS = {
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
+    "record": ("canopy.record", "Record a bus to a log that can be replayed."),
+    "replay": ("canopy.replay.cli", "Run the program again on a log, and compare it bit for bit."),
     "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),
     "spy": ("canopy.spy", "Start lcm-spy with Canopy's message types."),
 }

@@ -7,6 +7,7 @@ Every host tool reads this one file, `<application>.model.json`, and the DBC tha
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,14 @@ from typing import Any, TypeVar
 
 FORMAT = 1
 CATEGORIES = ("control", "decorator", "condition", "action")
-TRACE_MESSAGES = ("CanopyTick", "CanopyChange", "CanopySnapshot", "CanopyHealth")
+TRACE_MESSAGES = (
+    "CanopyTick",
+    "CanopyInputs",
+    "CanopyChange",
+    "CanopySnapshot",
+    "CanopyHealth",
+    "CanopyModel",
+)
 
 T = TypeVar("T")
 
@@ -102,7 +110,7 @@ class _Reader:
         return Model(
             path=self._path,
             application=self._get(data, "", "application", str),
-            hash=self._get(data, "", "hash", str),
+            hash=self._hash(data),
             period_us=period_us,
             tree_id=self._get(tree, "tree.", "id", str),
             nodes=self._nodes(self._get(tree, "tree.", "nodes", list)),
@@ -112,6 +120,12 @@ class _Reader:
             send=self._list(bus, "bus.", "send", self._name),
             trace=self._trace(self._get(data, "", "trace", dict)),
         )
+
+    def _hash(self, data: dict[str, Any]) -> str:
+        value = self._get(data, "", "hash", str)
+        if re.fullmatch("[0-9a-f]{16}", value) is None:
+            raise self._error("hash", f"is '{value}', must be 16 hexadecimal digits")
+        return value
 
     def _nodes(self, items: list[Any]) -> tuple[Node, ...]:
         if not items:

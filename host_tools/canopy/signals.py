@@ -66,7 +66,7 @@ class SignalTable:
         """
         self.refused = 0
         self._watched: dict[int, _Watched] = {}
-        database = _load(model)
+        database = load_database(model)
         for name in model.receive + model.send:
             try:
                 message = database.get_message_by_name(name)
@@ -108,7 +108,12 @@ class SignalTable:
         return None
 
 
-def _load(model: Model) -> Database:
+def load_database(model: Model) -> Database:
+    """The DBC beside a model.
+
+    Raises:
+        ModelError: It cannot be read.
+    """
     try:
         database = cantools.database.load_file(model.dbc, strict=False)
     except Exception as error:

@@ -88,6 +88,18 @@ class TreeView:
     """None until the first CanopyHealth."""
 
 
+def mismatch(model: Model, data: bytes) -> str | None:
+    """Compares a model with a CanopyModel frame's 8 bytes: None when they agree, else what is wrong and the way out."""
+    digits, nodes = f"{int.from_bytes(data[:4], 'little'):08x}", int.from_bytes(data[4:6], "little")
+    if (digits, nodes) == (model.hash[:8], len(model.nodes)):
+        return None
+    return (
+        f"{model.path}: is not the model of the tree that the controller runs: that one has {nodes} nodes and the hash "
+        f"{digits}…, the file has {len(model.nodes)} nodes and {model.hash[:8]}…; give the model file that was built "
+        "with the firmware, or with the tree image (canopy image build --model)"
+    )
+
+
 @dataclass
 class _Tick:
     """The tick whose frames are arriving."""
@@ -115,6 +127,8 @@ class TraceDecoder:
     restarts: int = 0
     refused: int = 0
     health: Health | None = None
+    mismatch: str | None = None
+    """Why the model is not that of the controller which the last CanopyModel came from; None while they agree."""
 
     _statuses: list[int] = field(init=False)
     _sequence: int | None = None
@@ -150,8 +164,11 @@ class TraceDecoder:
             return self._take_change(data)
         if name == "CanopySnapshot":
             return self._take_snapshot(data)
-        self.health = Health(*(int.from_bytes(data[place : place + 2], "little") for place in (0, 2, 4, 6)))
-        return ()
+        if name == "CanopyHealth":
+            self.health = Health(*(int.from_bytes(data[place : place + 2], "little") for place in (0, 2, 4, 6)))
+        elif name == "CanopyModel":
+            self.mismatch = mismatch(self.model, data)
+        return ()  # CanopyInputs is for replays
 
     def flush(self) -> tuple[TreeView, ...]:
         """Gives up waiting for the rest of the tick at hand; call it when the bus has been silent for some periods."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from canopy.model import Model
+from canopy.model import Model, ModelError
 from canopy.signals import SignalTable
 from canopy.trace import Health, TraceDecoder, TreeView, status_name
 
@@ -33,11 +33,18 @@ class Watch:
         self._ticks: deque[tuple[float, int]] = deque()
 
     def feed(self, identifier: int, data: bytes, now: float) -> tuple[TreeView, ...]:
-        """Takes one data frame; returns the ticks it completes."""
+        """Takes one data frame; returns the ticks it completes.
+
+        Raises:
+            ModelError: The controller says that it runs another tree than the model's.
+        """
         self.signals.feed(identifier, data, now)
         if identifier in self.model.trace.values():
             self._last_trace = now
-        return self._take(self._decoder.feed(identifier, data), now)
+        views = self._take(self._decoder.feed(identifier, data), now)
+        if self._decoder.mismatch is not None:
+            raise ModelError(self._decoder.mismatch)
+        return views
 
     def idle(self, now: float) -> tuple[TreeView, ...]:
         """Call this often: gives up waiting for frames of a tick that no longer come."""

@@ -4,10 +4,13 @@
 
 #include <stddef.h>
 
-/** Order of the table: standard ids before extended ones. */
+/** Order of the table: standard ids before extended ones. The driver's error frames are behind all: no message is one. */
 static uint32_t rank(uint32_t id, uint8_t flags)
 {
-    return id | ((flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x80000000) : 0u);
+    uint32_t extended = (flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
+    uint32_t error = (flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
+
+    return id | extended | error;
 }
 
 static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
@@ -32,9 +35,20 @@ static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
 
 static bool form_fits(const canopy_rx_message_t *message, const canopy_can_frame_t *frame)
 {
-    const uint8_t form = CANOPY_CAN_EXTENDED | CANOPY_CAN_FD | CANOPY_CAN_REMOTE | CANOPY_CAN_ERROR;
+    const uint8_t form = CANOPY_CAN_EXTENDED | CANOPY_CAN_FD | CANOPY_CAN_REMOTE;
 
     return (frame->flags & form) == message->flags && frame->length == message->length;
+}
+
+uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_t length)
+{
+    uint8_t result = (uint8_t)(((unsigned)check << 3) | ((unsigned)check >> 5));
+
+    result ^= (uint8_t)(id & 0xFFu);
+    for (uint8_t byte = 0; byte < length; byte++) {
+        result ^= data[byte];
+    }
+    return result;
 }
 
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
@@ -49,10 +63,12 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
     }
     message = &self->bus->rx[index];
     state = &self->rx[index];
+    self->taken++;
     if (!form_fits(message, frame)) {
         canopy_count(&self->counters.wrong_form);
         return;
     }
+    self->check = canopy_bus_check(self->check, frame->id, frame->data, frame->length);
     if (message->data_id != CANOPY_E2E_NONE) {
         canopy_e2e_result_t result =
             canopy_e2e_check(&state->e2e, (uint16_t)message->data_id, frame->data, frame->length);

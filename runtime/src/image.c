@@ -56,6 +56,7 @@ static bool find_parts(canopy_image_parts_t *image, const uint8_t *bytes, size_t
     image->use_count = canopy_image_get32(bytes + 44);
     image->value_count = canopy_image_get32(bytes + 48);
     image->text_size = canopy_image_get32(bytes + 52);
+    image->hash = canopy_image_get32(bytes + 20);
     needed = CANOPY_IMAGE_HEADER + (uint64_t)NODE_SIZE * image->node_count +
              (uint64_t)PARAMETER_SIZE * image->parameter_count +
              (uint64_t)HASH_SIZE * ((uint64_t)image->kind_count + image->script_count + image->entry_count) +
@@ -219,7 +220,8 @@ static canopy_image_error_t make_tree(canopy_image_parts_t *image)
                             .control_count = own->control_count,
                             .script_count = image->script_count,
                             .parameter_count = image->parameter_count,
-                            .word_count = image->word_count};
+                            .word_count = image->word_count,
+                            .hash = image->hash};
     image->where = 0;
     return canopy_tree_validate(tree, &image->where) == CANOPY_OK ? CANOPY_IMAGE_OK : CANOPY_IMAGE_TREE;
 }

@@ -32,6 +32,7 @@ typedef struct {
     uint32_t use_count;
     uint32_t value_count;
     uint32_t text_size;
+    uint32_t hash; /* first 8 digits of the tree's */
     uint32_t next_use;
     uint32_t next_value;
     uint16_t where;

@@ -98,7 +98,12 @@ canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
     root = canopy_tree_tick(app->tree_instance, now);
     canopy_bus_commit(app->bus_state, self->config->can, self->ticks);
     canopy_trace_send(app->trace, app->trace_state, app->tree_instance, self->config->can,
-                      &(canopy_trace_tick_t){.tick = self->ticks, .root = root, .overruns = self->overruns},
+                      &(canopy_trace_tick_t){.tick = self->ticks,
+                                             .root = root,
+                                             .overruns = self->overruns,
+                                             .now = now,
+                                             .taken = app->bus_state->taken,
+                                             .check = app->bus_state->check},
                       &app->bus_state->counters);
     self->ticks++;
     if (app->tree_instance->faults != faults) {

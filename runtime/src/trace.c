@@ -54,6 +54,20 @@ static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t 
     send(self, can, config->tick, data);
 }
 
+/** What the tick worked with. Without a sequence number: there is one after each CanopyTick. */
+static void send_inputs(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_can_t *can,
+                        const canopy_trace_tick_t *tick)
+{
+    uint8_t data[8];
+
+    put16(&data[0], (uint32_t)(tick->now & 0xFFFFu));
+    put16(&data[2], (uint32_t)((tick->now >> 16) & 0xFFFFu));
+    put16(&data[4], (uint32_t)((tick->now >> 32) & 0xFFFFu));
+    data[6] = tick->taken;
+    data[7] = tick->check;
+    send(self, can, config->inputs, data);
+}
+
 /** One CanopyChange frame with one or two nodes, whose statuses count as sent. */
 static void send_change(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                         const canopy_tree_instance_t *tree, const canopy_can_t *can, const uint16_t pair[2])
@@ -124,6 +138,17 @@ static void send_health(const canopy_trace_config_t *config, canopy_trace_state_
     send(self, can, config->health, data);
 }
 
+static void send_model(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_tree_t *tree,
+                       const canopy_can_t *can)
+{
+    uint8_t data[8] = {0};
+
+    put16(&data[0], tree->hash);
+    put16(&data[2], tree->hash >> 16);
+    put16(&data[4], tree->node_count);
+    send(self, can, config->model, data);
+}
+
 void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                        const canopy_tree_instance_t *tree, const canopy_can_t *can, const canopy_trace_tick_t *tick,
                        const canopy_bus_counters_t *counters)
@@ -134,11 +159,17 @@ void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t
     if (config->tick.id != CANOPY_TRACE_OFF) {
         send_tick(config, self, can, tick, changes);
     }
+    if (config->inputs.id != CANOPY_TRACE_OFF) {
+        send_inputs(config, self, can, tick);
+    }
     send_changes(config, self, tree, can, changes);
     if (config->snapshot.id != CANOPY_TRACE_OFF) {
         send_snapshot(config, self, tree, can);
     }
     if (config->health.id != CANOPY_TRACE_OFF && tick->tick % config->health_every == 0u) {
         send_health(config, self, tree, can, counters);
+    }
+    if (config->model.id != CANOPY_TRACE_OFF && tick->tick % config->model_every == 0u) {
+        send_model(config, self, tree->tree, can);
     }
 }

@@ -266,7 +266,8 @@ static void run(tables_t *tables)
     static uint16_t words[WORDS + 1];
     static canopy_tree_instance_t self;
     const canopy_can_t can = {.send = take_frame};
-    const canopy_trace_config_t config = {.health_every = 3, .changes_max = (uint8_t)(1u + take8(&input) % 127u)};
+    const canopy_trace_config_t config = {
+        .health_every = 3, .model_every = 2, .changes_max = (uint8_t)(1u + take8(&input) % 127u)};
     const canopy_bus_counters_t counters = {.unknown_id = take32(&input)};
     canopy_trace_state_t trace = {.sent = sent};
     canopy_time_t now = take32(&input) * UINT64_C(0xFFFFFFFF);

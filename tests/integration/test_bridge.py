@@ -167,6 +167,25 @@ def test_a_bus_that_is_not_there_is_one_line(tmp_path: Path, tool: str, spec: st
 
 
 @pytest.mark.parametrize("tool", ["bridge", "monitor"])
+def test_the_model_of_another_tree_is_one_line_with_a_way_out(
+    tmp_path: Path, bus_dir: Path, bus: can.BusABC, tool: str
+) -> None:
+    source, model = TraceSource(4), write_model(tmp_path)
+    command = [sys.executable, "-m", "canopy", tool, "--model", str(model), "--can", SPEC]
+    with Process([*NO_ROUTE, *command]) as watcher:
+        wait_for_participants(bus_dir, 2)
+        send(bus, [source.model(0x01234567, 4), *source.frames([1, 0, 0, 0]), source.model(0x01234567, 5)])
+        _, errors = watcher.end(None)
+    assert watcher.popen.returncode == 1
+    line = errors.splitlines()[-1]
+    assert line.startswith(
+        f"canopy {tool}: {model}: is not the model of the tree that the controller runs: that one has "
+    )
+    assert "5 nodes and the hash 01234567…, the file has 4 nodes and 01234567…" in line
+    assert "canopy image build --model" in line
+
+
+@pytest.mark.parametrize("tool", ["bridge", "monitor"])
 def test_a_model_that_is_not_there_is_one_line(tmp_path: Path, tool: str) -> None:
     command = [sys.executable, "-m", "canopy", tool, "--model", str(tmp_path / "x.json"), "--can", "unixbus:x"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from canopy.model import ModelError, load_model
+from canopy.model import TRACE_MESSAGES, ModelError, load_model
 from integration.trace_source import model_data, write_model
 
 
@@ -21,7 +21,7 @@ def test_the_compilers_models_are_read(build_dir: Path) -> None:
         assert model.application == application
         assert len(model.nodes) == nodes
         assert [model.depth(node.index) for node in model.nodes] == [0] + [1] * (nodes - 1)
-        assert set(model.trace) == {"CanopyTick", "CanopyChange", "CanopySnapshot", "CanopyHealth"}
+        assert set(model.trace) == set(TRACE_MESSAGES)
 
 
 def change(*place: str | int, to: Any) -> Callable[[Any], None]:
@@ -47,6 +47,7 @@ def remove(*place: str | int) -> Callable[[Any], None]:
     [
         (change("format", to=2), "format: is 2, these tools read 1: build the application again"),
         (remove("hash"), "hash: is missing"),
+        (change("hash", to="0123456789ABCDEF"), "hash: is '0123456789ABCDEF', must be 16 hexadecimal digits"),
         (change("application", to=7), "application: is 7, must be of type str"),
         (change("period_us", to=True), "period_us: is True, must be of type int"),
         (change("period_us", to=0), "period_us: is 0, must be above 0"),

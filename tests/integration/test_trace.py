@@ -226,6 +226,21 @@ def test_garbage_never_raises_and_counters_only_grow(models: dict[int, Model], n
         before = now
 
 
+def test_what_a_tick_worked_with_changes_no_view(models: dict[int, Model]) -> None:
+    source, decoder = TraceSource(4), TraceDecoder(models[4])
+    head, *rest = source.frames([1, 3, 1, 0])
+    (view,) = feed(decoder, [head, source.inputs(2**48 - 1, 255, 254), *rest])
+    assert (view.complete, view.statuses, view.lost, view.refused) == (True, (1, 3, 1, 0), 0, 0)
+
+
+def test_a_controller_that_runs_another_tree_is_noticed(models: dict[int, Model]) -> None:
+    source, decoder = TraceSource(4), TraceDecoder(models[4])
+    own = int(models[4].hash[:8], 16)
+    for digits, nodes, right in ((own, 4, True), (own + 1, 4, False), (own, 5, False), (own, 4, True)):
+        assert decoder.feed(*source.model(digits, nodes)) == ()
+        assert (decoder.mismatch is None) == right
+
+
 def test_status_names() -> None:
     assert [status_name(code) for code in (-1, 0, 1, 2, 3, 4, 9, 10)] == [
         "unknown",

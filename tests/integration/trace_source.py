@@ -14,7 +14,14 @@ import cantools
 from cantools.database.can import Database
 
 DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
-IDS = {"CanopyTick": 0x600, "CanopyChange": 0x601, "CanopySnapshot": 0x602, "CanopyHealth": 0x603}
+IDS = {
+    "CanopyTick": 0x600,
+    "CanopyChange": 0x601,
+    "CanopySnapshot": 0x602,
+    "CanopyHealth": 0x603,
+    "CanopyInputs": 0x604,
+    "CanopyModel": 0x605,
+}
 
 Frame = tuple[int, bytes]
 
@@ -91,6 +98,13 @@ class TraceSource:
     def health(self, **counters: int) -> Frame:
         fields = {"RxRejected": 0, "RxUnknown": 0, "TxDropped": 0, "Faults": 0, **counters}
         return IDS["CanopyHealth"], self._database.encode_message("CanopyHealth", fields)
+
+    def inputs(self, now: int, taken: int, check: int) -> Frame:
+        fields = {"Now": now, "Taken": taken, "Check": check}
+        return IDS["CanopyInputs"], self._database.encode_message("CanopyInputs", fields)
+
+    def model(self, digits: int, nodes: int) -> Frame:
+        return IDS["CanopyModel"], self._database.encode_message("CanopyModel", {"Hash": digits, "Nodes": nodes})
 
     def _frame(self, name: str, fields: dict[str, int]) -> Frame:
         data = self._database.encode_message(name, {"Sequence": self.sequence, **fields})

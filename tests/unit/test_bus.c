@@ -200,6 +200,59 @@ static void what_is_wrong_changes_nothing_but_a_counter(void)
     refused(speed_frame(2, SPEED_MAX + 1), &bus.counters.out_of_range);
 }
 
+static void an_error_frame_is_no_message_whatever_its_id(void)
+{
+    canopy_can_frame_t frame = speed_frame(2, 50);
+
+    frame.flags = CANOPY_CAN_ERROR;
+    refused(frame, &bus.counters.unknown_id);
+    frame.id = PLAIN_ID;
+    frame.flags = CANOPY_CAN_ERROR | CANOPY_CAN_EXTENDED;
+    refused(frame, &bus.counters.unknown_id);
+}
+
+static void what_was_taken_is_counted_and_checked_for_a_replay(void)
+{
+    canopy_can_frame_t frame = {.id = PLAIN_ID, .flags = CANOPY_CAN_EXTENDED, .length = 1, .data = {9}};
+
+    receive(frame, 0);
+    TEST_ASSERT_EQUAL_UINT8(1, bus.taken);
+    TEST_ASSERT_EQUAL_HEX8(9, bus.check); /* the low byte of the id is 0 */
+    frame.data[0] = 0x80;
+    receive(frame, 0);
+    TEST_ASSERT_EQUAL_UINT8(2, bus.taken);
+    TEST_ASSERT_EQUAL_HEX8(0x48 ^ 0x80, bus.check);
+    frame.length = 64; /* of a wrong form: counted, but its bytes may be anything */
+    receive(frame, 0);
+    frame.flags = CANOPY_CAN_EXTENDED | CANOPY_CAN_REMOTE;
+    frame.length = 1;
+    receive(frame, 0);
+    TEST_ASSERT_EQUAL_UINT8(4, bus.taken);
+    TEST_ASSERT_EQUAL_HEX8(0x48 ^ 0x80, bus.check);
+    frame.flags = CANOPY_CAN_ERROR;
+    receive(frame, 0);
+    frame.flags = 0;
+    frame.id = 0x7FF;
+    receive(frame, 0);
+    TEST_ASSERT_EQUAL_UINT8(4, bus.taken);
+    for (unsigned more = 0; more < 255u; more++) {
+        receive(speed_frame(0, 42), 0); /* right, and repeated */
+    }
+    TEST_ASSERT_EQUAL_UINT8(3, bus.taken);
+}
+
+static void the_check_tells_frames_and_their_order_apart(void)
+{
+    static const uint8_t data[3] = {0x01, 0x02, 0x10};
+
+    TEST_ASSERT_EQUAL_HEX8(0x00, canopy_bus_check(0, 0x100, data, 0));
+    TEST_ASSERT_EQUAL_HEX8(0x13, canopy_bus_check(0, 0x100, data, 3));
+    TEST_ASSERT_EQUAL_HEX8(0x13 ^ 0x23, canopy_bus_check(0, 0x123, data, 3));
+    TEST_ASSERT_EQUAL_HEX8(0x0D, canopy_bus_check(0xA1, 0, data, 0)); /* rotated */
+    TEST_ASSERT_NOT_EQUAL(canopy_bus_check(canopy_bus_check(0, 1, data, 3), 2, data, 2),
+                          canopy_bus_check(canopy_bus_check(0, 2, data, 2), 1, data, 3));
+}
+
 static void outputs_take_their_safe_values_before_each_tick(void)
 {
     output.torque = 99;
@@ -374,6 +427,9 @@ int main(void)
     RUN_TEST(nothing_is_fresh_before_the_first_frame);
     RUN_TEST(without_a_timeout_a_message_stays_fresh);
     RUN_TEST(what_is_wrong_changes_nothing_but_a_counter);
+    RUN_TEST(an_error_frame_is_no_message_whatever_its_id);
+    RUN_TEST(what_was_taken_is_counted_and_checked_for_a_replay);
+    RUN_TEST(the_check_tells_frames_and_their_order_apart);
     RUN_TEST(outputs_take_their_safe_values_before_each_tick);
     RUN_TEST(messages_go_out_at_their_rate_with_counter_and_crc);
     RUN_TEST(a_frame_that_the_driver_does_not_take_is_dropped_and_counted);

@@ -241,6 +241,7 @@ static void the_image_of_the_own_tree_ticks_as_the_tree(void)
     TEST_ASSERT_TRUE(exchange_seen.starts > 3u && exchange_seen.halts > 2u); /* something happened */
     load_and_run(exchange_main_bytes, sizeof exchange_main_bytes);
     TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == EXCHANGE_TREE_HASH);
+    TEST_ASSERT_EQUAL_HEX32(EXCHANGE_TREE_HASH >> 32, exchange_app.tree_instance->tree->hash);
     run_for_records(true);
     TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run_own(&exchange_image, &loop, time));
     TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == 0u);

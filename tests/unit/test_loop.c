@@ -6,7 +6,16 @@
 #include "fake_can.h"
 #include "unity.h"
 
-enum { NODES = 13, PERIOD_US = 1000, TICK_ID = 0x600, CHANGE_ID = 0x601, SNAPSHOT_ID = 0x602, HEALTH_ID = 0x603 };
+enum {
+    NODES = 13,
+    PERIOD_US = 1000,
+    TICK_ID = 0x600,
+    CHANGE_ID = 0x601,
+    SNAPSHOT_ID = 0x602,
+    HEALTH_ID = 0x603,
+    INPUTS_ID = 0x604,
+    MODEL_ID = 0x605
+};
 
 /* --- an application by hand: a ReactiveFallback over twelve conditions -------------------------------------------- */
 
@@ -20,7 +29,8 @@ static canopy_status_t leaf_tick(void *application, uint16_t parameter)
 }
 
 static const canopy_leaf_t leaves[] = {{.tick = leaf_tick}};
-static const canopy_tree_t tree = {.nodes = nodes, .leaves = leaves, .node_count = NODES, .leaf_count = 1};
+static const canopy_tree_t tree = {
+    .nodes = nodes, .leaves = leaves, .node_count = NODES, .leaf_count = 1, .hash = 0x14BD7221};
 
 static void reset_output(void *output)
 {
@@ -39,7 +49,9 @@ static const canopy_bus_t bus = {.reset_output = reset_output, .set_now = set_no
 static const canopy_trace_config_t trace = {.tick = {.id = TICK_ID},
                                             .change = {.id = CHANGE_ID},
                                             .snapshot = {.id = SNAPSHOT_ID},
+                                            .inputs = {.id = CANOPY_TRACE_OFF},
                                             .health = {.id = HEALTH_ID},
+                                            .model = {.id = CANOPY_TRACE_OFF},
                                             .health_every = 4,
                                             .changes_max = 2,
                                             .tree = 3};
@@ -274,6 +286,47 @@ static void a_single_change_names_no_second_node(void)
     TEST_ASSERT_EQUAL_HEX8(0xFB, fake.tx[1].data[5]);
 }
 
+static void inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is(void)
+{
+    static const canopy_trace_config_t replayed = {.tick = {.id = TICK_ID},
+                                                   .inputs = {.id = INPUTS_ID, .flags = CANOPY_CAN_EXTENDED},
+                                                   .change = {.id = CANOPY_TRACE_OFF},
+                                                   .snapshot = {.id = CANOPY_TRACE_OFF},
+                                                   .health = {.id = CANOPY_TRACE_OFF},
+                                                   .model = {.id = MODEL_ID},
+                                                   .health_every = 1,
+                                                   .model_every = 3};
+    static const uint8_t inputs_0[] = {0xA6, 0xA5, 0xA4, 0xA3, 0xA2, 0xA1, 200, 0x5A};
+    static const uint8_t model_0[] = {0x21, 0x72, 0xBD, 0x14, NODES, 0, 0, 0};
+    canopy_app_t traced = app;
+    canopy_loop_config_t traced_config = config;
+    unsigned count;
+
+    traced.trace = &replayed;
+    traced_config.app = &traced;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &traced_config));
+    bus_state.taken = 200;
+    bus_state.check = 0x5A;
+    (void)canopy_loop_cycle(&loop, UINT64_C(0xFFFFA1A2A3A4A5A6)); /* only 48 bits have room */
+    TEST_ASSERT_EQUAL_UINT(3, fake.tx_count);
+    TEST_ASSERT_EQUAL_HEX32(TICK_ID, fake.tx[0].id);
+    TEST_ASSERT_EQUAL_HEX32(INPUTS_ID, fake.tx[1].id);
+    TEST_ASSERT_EQUAL_HEX8(CANOPY_CAN_EXTENDED, fake.tx[1].flags);
+    TEST_ASSERT_EQUAL_UINT8(8, fake.tx[1].length);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(inputs_0, fake.tx[1].data, 8);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(model_0, only(MODEL_ID, &count)->data, 8);
+    TEST_ASSERT_EQUAL_UINT8(1, trace_state.sequence);
+    (void)canopy_loop_cycle(&loop, 0);
+    (void)canopy_loop_cycle(&loop, 0);
+    (void)only(MODEL_ID, &count);
+    TEST_ASSERT_EQUAL_UINT(1, count);
+    (void)canopy_loop_cycle(&loop, 0);
+    (void)only(MODEL_ID, &count);
+    TEST_ASSERT_EQUAL_UINT(2, count);
+    (void)only(INPUTS_ID, &count);
+    TEST_ASSERT_EQUAL_UINT(4, count);
+}
+
 static void lost_trace_frames_are_counted(void)
 {
     fake.tx_result = 0;
@@ -327,6 +380,7 @@ int main(void)
     RUN_TEST(faults_are_counted_and_reported);
     RUN_TEST(the_trace_tells_what_changed_and_sends_the_rest_later);
     RUN_TEST(a_single_change_names_no_second_node);
+    RUN_TEST(inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is);
     RUN_TEST(lost_trace_frames_are_counted);
     RUN_TEST(the_tick_number_wraps_and_messages_go_on);
     RUN_TEST(init_refuses_an_incomplete_application);

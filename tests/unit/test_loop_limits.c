@@ -57,7 +57,9 @@ static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_now =
 static const canopy_trace_config_t no_trace = {.tick = {.id = CANOPY_TRACE_OFF},
                                                .change = {.id = CANOPY_TRACE_OFF},
                                                .snapshot = {.id = CANOPY_TRACE_OFF},
+                                               .inputs = {.id = CANOPY_TRACE_OFF},
                                                .health = {.id = CANOPY_TRACE_OFF},
+                                               .model = {.id = CANOPY_TRACE_OFF},
                                                .health_every = 1,
                                                .changes_max = 1};
 
@@ -241,7 +243,9 @@ static void counters_stay_at_their_largest_value(void)
     static const canopy_trace_config_t health = {.tick = {.id = CANOPY_TRACE_OFF},
                                                  .change = {.id = CANOPY_TRACE_OFF},
                                                  .snapshot = {.id = CANOPY_TRACE_OFF},
+                                                 .inputs = {.id = CANOPY_TRACE_OFF},
                                                  .health = {.id = 7},
+                                                 .model = {.id = CANOPY_TRACE_OFF},
                                                  .health_every = 1};
 
     app.trace = &health;

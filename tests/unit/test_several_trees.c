@@ -24,7 +24,7 @@ static sent_t sent[] = {
     {DRIVER_DRIVE_ID, 20, 0, 0}, {DRIVER_LAMP_ID, 40, 0, 0}, {NAVIGATOR_GOAL_ID, 40, 0, 0},
     {ECHO_ID, 120, 0, 0},        {0x600, 10, 0, 0},          {0x602, 10, 0, 0},
     {0x603, 400, 0, 0},          {0x610, 40, 0, 0},          {0x612, 40, 0, 0},
-    {0x613, 400, 0, 0},
+    {0x613, 400, 0, 0},          {0x614, 40, 0, 0},          {0x615, 400, 0, 0},
 };
 enum { KINDS = sizeof sent / sizeof sent[0] };
 

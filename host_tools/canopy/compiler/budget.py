@@ -93,7 +93,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost) -> int:
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 5, *[u32] * 9])
+    bus_state = struct_size([*[pointer] * 5, *[u32] * 9, u8, u8])
     trace_state = struct_size([pointer, u16, u8, u32])
     rx_state = struct_size([u64, *[u8] * 4])
     image_in = struct_size([u64, *(_message_struct(m, received=True) for m in bus.receive)])
@@ -187,7 +187,12 @@ def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -
     per_second = sum(
         frame_bits(length, extended=extended, fd=fd) * 1000 / cycle for length, extended, fd, cycle in bus.load if cycle
     )
-    for name, frames in (("CanopyTick", 1), ("CanopyChange", changes_max), ("CanopySnapshot", 1)):
+    for name, frames in (
+        ("CanopyTick", 1),
+        ("CanopyInputs", 1),
+        ("CanopyChange", changes_max),
+        ("CanopySnapshot", 1),
+    ):
         if name in bus.trace and bus.trace[name].cycle_ms == 0:
             message = bus.trace[name]
             per_second += frames * frame_bits(8, extended=message.extended, fd=False) * 1000 / period_ms

@@ -68,11 +68,10 @@ class Application:
         """The user's header."""
         return self.options.include
 
-    @property
-    def health_every(self) -> int:
-        """CanopyHealth is sent in every so-many-th tick."""
-        health = self.bus.trace.get("CanopyHealth")
-        return max(1, health.cycle_ms // self.period_ms) if health is not None else 1
+    def every(self, name: str) -> int:
+        """The slow trace message of this name is sent in every so-many-th tick."""
+        message = self.bus.trace.get(name)
+        return max(1, message.cycle_ms // self.period_ms) if message is not None else 1
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:

@@ -45,7 +45,7 @@ def exchangeable(table: Table) -> Table:
 def memory_size(table: Table, room: Room) -> tuple[int, int]:
     """(size, alignment) of the struct that the template image_memory.c.j2 declares."""
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
-    tree = struct_size([*[pointer] * 5, *[u16] * 6])
+    tree = struct_size([*[pointer] * 5, *[u16] * 6, u32])
     node = struct_size([u8, u8, *[u16] * 5])
     kinds = []
     for use in table.users:

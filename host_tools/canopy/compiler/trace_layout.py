@@ -18,6 +18,7 @@ TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
         "Changes": (48, 8),
         "Overruns": (56, 8),
     },
+    "CanopyInputs": {"Now": (0, 48), "Taken": (48, 8), "Check": (56, 8)},
     "CanopyChange": {
         "Sequence": (0, 8),
         "NodeA": (8, 16),
@@ -32,6 +33,7 @@ TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
         **{f"Status{place}": (24 + 4 * place, 4) for place in range(10)},
     },
     "CanopyHealth": {"RxRejected": (0, 16), "RxUnknown": (16, 16), "TxDropped": (32, 16), "Faults": (48, 16)},
+    "CanopyModel": {"Hash": (0, 32), "Nodes": (32, 16)},
 }
 
 

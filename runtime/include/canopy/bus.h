@@ -90,6 +90,9 @@ typedef struct {
     canopy_rx_state_t *rx; /**< bus->rx_count. */
     uint8_t *tx_counters;  /**< bus->tx_count E2E counters. */
     canopy_bus_counters_t counters;
+    /** What CanopyInputs tells of the frames taken since the start, so that a replay can take the same ones: */
+    uint8_t taken; /**< How many had the id of a message, refused ones too; modulo 256. */
+    uint8_t check; /**< canopy_bus_check() over those of a right form. */
 } canopy_bus_state_t;
 
 /** The sum, or the largest value where that is less. O(1); may be called from anywhere. */
@@ -103,6 +106,13 @@ static inline void canopy_count(uint32_t *counter)
 {
     *counter += *counter != UINT32_MAX ? 1u : 0u;
 }
+
+/**
+ * The running check of CanopyInputs after one more frame: the one before, rotated left by 3, XOR the low byte of the id,
+ * XOR every byte of data. It tells frames apart and notices their order; it protects nothing. O(length).
+ * @param length bytes of data; not checked
+ */
+uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_t length);
 
 /**
  * Takes one frame into the input image, or refuses and counts it. O(log messages + bytes).

@@ -90,6 +90,7 @@ typedef struct {
     uint16_t script_count;
     uint16_t parameter_count;
     uint16_t word_count; /**< State words of all nodes together. */
+    uint32_t hash;       /**< First 8 digits of the model file's hash, for CanopyModel; 0: not known. */
 } canopy_tree_t;
 
 /** One running instance of a tree. Set up by canopy_tree_init(); read the counters, leave the rest alone. */

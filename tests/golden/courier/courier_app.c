@@ -494,16 +494,20 @@ static const canopy_tree_t tree = {
     .script_count = 0,
     .parameter_count = sizeof parameters / sizeof parameters[0],
     .word_count = COURIER_WORDS,
+    .hash = UINT32_C(0x61a2a79e), /* first 8 digits of COURIER_TREE_HASH */
 };
 
 /* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
 extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc;
 const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc = {
     .tick = {.id = COURIER_CANOPY_TICK_ID},
+    .inputs = {.id = CANOPY_TRACE_OFF},
     .change = {.id = COURIER_CANOPY_CHANGE_ID},
     .snapshot = {.id = COURIER_CANOPY_SNAPSHOT_ID},
     .health = {.id = COURIER_CANOPY_HEALTH_ID},
+    .model = {.id = CANOPY_TRACE_OFF},
     .health_every = 20, /* ticks */
+    .model_every = 1,   /* ticks */
     .changes_max = 8,   /* frames a tick */
 };
 

@@ -85,16 +85,20 @@ static const canopy_tree_t tree = {
     .script_count = 0,
     .parameter_count = 0,
     .word_count = ROOM_WORDS,
+    .hash = UINT32_C(0xd6027370), /* first 8 digits of ROOM_TREE_HASH */
 };
 
 /* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
 extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_room_dbc;
 const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_room_dbc = {
     .tick = {.id = CANOPY_TRACE_OFF},
+    .inputs = {.id = CANOPY_TRACE_OFF},
     .change = {.id = CANOPY_TRACE_OFF},
     .snapshot = {.id = CANOPY_TRACE_OFF},
     .health = {.id = CANOPY_TRACE_OFF},
+    .model = {.id = CANOPY_TRACE_OFF},
     .health_every = 1, /* ticks */
+    .model_every = 1,  /* ticks */
     .changes_max = 2,  /* frames a tick */
 };
 

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * CAN driver and clock that replay a record; the contract is in replay.h.
+ */
+#include "canopy/clock/replay.h"
+
+#include <stddef.h>
+
+enum { INPUTS_LENGTH = 8, NOW_BYTES = 6 };
+
+static void read_next(canopy_replay_t *self)
+{
+    self->left = self->io.read(self->io.context, &self->next);
+    if (self->left < 0) {
+        self->error = (canopy_error_t)self->left;
+    }
+}
+
+/** Is the next frame the beginning of a tick? */
+static bool is_at_tick(const canopy_replay_t *self)
+{
+    return self->left == 1 && self->next.id == self->inputs.id && self->next.flags == self->inputs.flags &&
+           self->next.length == (uint8_t)INPUTS_LENGTH;
+}
+
+static canopy_time_t time_of_tick(const canopy_replay_t *self)
+{
+    canopy_time_t time = 0;
+
+    for (unsigned byte = 0; byte < (unsigned)NOW_BYTES; byte++) {
+        time |= (canopy_time_t)self->next.data[byte] << (8u * byte);
+    }
+    return time;
+}
+
+static int replay_receive(void *context, canopy_can_frame_t *frame)
+{
+    canopy_replay_t *self = context;
+
+    if (self->left != 1 || is_at_tick(self)) {
+        return 0;
+    }
+    *frame = self->next;
+    self->stats.received++;
+    read_next(self);
+    return 1;
+}
+
+static int replay_send(void *context, const canopy_can_frame_t *frame)
+{
+    canopy_replay_t *self = context;
+    int result = self->io.write != NULL ? self->io.write(self->io.context, frame) : 1;
+
+    if (result < 0) {
+        self->error = (canopy_error_t)result;
+        self->stats.tx_dropped++;
+        return result;
+    }
+    self->stats.sent++;
+    return 1;
+}
+
+static void replay_stats(void *context, canopy_can_stats_t *stats)
+{
+    const canopy_replay_t *self = context;
+
+    *stats = self->stats;
+}
+
+static canopy_time_t replay_now(void *context)
+{
+    const canopy_replay_t *self = context;
+
+    return self->now;
+}
+
+static bool replay_wait_until(void *context, canopy_time_t deadline)
+{
+    canopy_replay_t *self = context;
+
+    (void)deadline;
+    /* The first tick's frame is waiting since canopy_replay_init(). What a tick has left (rx_max) is not for the next. */
+    while (self->left == 1 && !is_at_tick(self)) {
+        self->stats.rx_dropped++;
+        read_next(self);
+    }
+    if (self->left != 1 || self->error != CANOPY_OK) {
+        return false;
+    }
+    self->now = time_of_tick(self);
+    read_next(self);
+    return true;
+}
+
+canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_t *io, canopy_trace_id_t inputs)
+{
+    if (self == NULL || io == NULL || io->read == NULL) {
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    if (inputs.id == CANOPY_TRACE_OFF) {
+        return CANOPY_ERROR_UNSUPPORTED;
+    }
+    *self = (canopy_replay_t){
+        .can = {.context = self, .receive = replay_receive, .send = replay_send, .stats = replay_stats},
+        .clock = {.context = self, .now = replay_now, .wait_until = replay_wait_until},
+        .io = *io,
+        .inputs = inputs};
+    read_next(self);
+    if (self->error != CANOPY_OK) {
+        return self->error;
+    }
+    if (!is_at_tick(self)) {
+        return CANOPY_ERROR_NOT_FOUND;
+    }
+    self->now = time_of_tick(self);
+    return CANOPY_OK;
+}
+
+canopy_error_t canopy_replay_error(const canopy_replay_t *self)
+{
+    return self->error;
+}

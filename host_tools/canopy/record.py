@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: MIT
+"""`canopy record`: every frame of a bus, with its time, into a log for `canopy replay` and other tools."""
+
+from __future__ import annotations
+
+import json
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import can
+import click
+from can.interfaces.socketcan import SocketcanBus
+
+from canopy.canbus import CanBusError, is_plain_data, open_bus, receive_losses, split_spec
+from canopy.model import Model, ModelError, load_model
+from canopy.stop import StopFlag
+from canopy.trace import TraceDecoder, TreeView
+
+SUFFIXES = (".log", ".asc", ".blf")
+"""Formats that keep all of a frame: candump's, Vector's text, Vector's binary."""
+
+_POLL_S = 0.1
+_TERMINAL_PERIOD_S = 0.5
+_LINE_PERIOD_S = 10.0
+_RECEIVE_BUFFER = 4 << 20
+
+
+class RecordError(Exception):
+    """The log cannot be written; the text says why, and the way out."""
+
+
+@dataclass
+class Summary:
+    """What was recorded."""
+
+    file: str
+    frames: int = 0
+    error_frames: int = 0
+    """Of these: error frames of the own CAN controller."""
+    seconds: float = 0.0
+    lost: int | None = 0
+    """Frames that this program was too slow for; None where the driver does not say."""
+    ticks: int | None = None
+    """With a model: ticks of the controller."""
+    trace_lost: int | None = None
+    """With a model: trace frames that are missing in the log, whoever lost them."""
+    starts: int | None = None
+    """With a model: how often the controller's first tick was recorded. A replay begins there."""
+
+    def text(self) -> str:
+        """For people, one line."""
+        lost = "losses not known" if self.lost is None else f"{self.lost} lost"
+        text = f"{self.frames} frames in {self.seconds:.1f} s, {lost}"
+        if self.ticks is not None:
+            text += f"; {self.ticks} ticks, {self.trace_lost} trace frames lost, {self.starts} starts of the controller"
+        return text
+
+
+class Recorder:
+    """Writes frames, and counts what they tell."""
+
+    def __init__(self, writer: can.io.generic.MessageWriter, path: Path, channel: str, model: Model | None) -> None:
+        self.summary = Summary(str(path))
+        self.decoder = TraceDecoder(model) if model is not None else None
+        self._writer = writer
+        self._channel = channel
+        self._started = time.monotonic()
+        self._last_tick: int | None = None
+        self._told: set[str] = set()
+        if model is not None:
+            self.summary.ticks = self.summary.trace_lost = self.summary.starts = 0
+
+    def take(self, message: can.Message) -> None:
+        """Writes one frame."""
+        message.channel = self._channel  # a folder's path could hold blanks, which candump's format has no quotes for
+        self._writer.on_message_received(message)
+        self.summary.frames += 1
+        self.summary.error_frames += message.is_error_frame
+        if self.decoder is not None and is_plain_data(message):
+            self._count(self.decoder, self.decoder.feed(message.arbitration_id, bytes(message.data)))
+
+    def update(self, bus: can.BusABC) -> None:
+        """Brings the summary up to date, and says once what a user should know while there is time to mend it."""
+        summary, decoder = self.summary, self.decoder
+        summary.seconds = round(time.monotonic() - self._started, 3)
+        summary.lost = receive_losses(bus)
+        if summary.lost:
+            self._tell(
+                "frames are lost: this machine is too slow for the bus; the log cannot be replayed from there on"
+            )
+        if decoder is not None:
+            summary.trace_lost = decoder.lost
+            if decoder.lost:
+                self._tell("trace frames are lost on the way; the log cannot be replayed from there on")
+            if decoder.mismatch is not None:
+                self._tell(decoder.mismatch)
+
+    def _count(self, decoder: TraceDecoder, views: tuple[TreeView, ...]) -> None:
+        assert self.summary.ticks is not None
+        assert self.summary.starts is not None
+        for view in views:
+            if self._last_tick is None and view.tick != 0:
+                self._tell(
+                    f"the controller was running already (tick {view.tick}); a replay begins with its first tick: "
+                    "start the record first, then the controller"
+                )
+            self.summary.starts += view.tick == 0
+            self.summary.ticks += 1
+            self._last_tick = view.tick
+
+    def _tell(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            click.echo(f"canopy record: {text}", err=True)
+
+
+class _Progress:
+    """A line on stderr: in a terminal always the same one, into a file a new one now and then."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._due = time.monotonic() + _TERMINAL_PERIOD_S
+
+    def is_due(self) -> bool:
+        return time.monotonic() >= self._due
+
+    def show(self, text: str) -> None:
+        self._due = time.monotonic() + (_TERMINAL_PERIOD_S if self._terminal else _LINE_PERIOD_S)
+        click.echo(f"\r{text}\x1b[K" if self._terminal else text, err=True, nl=not self._terminal)
+
+    def end(self) -> None:
+        if self._terminal:
+            click.echo("\r\x1b[K", err=True, nl=False)
+
+
+@contextmanager
+def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
+    """A new log, in the format of its suffix; whole when the context ends.
+
+    Raises:
+        RecordError: It cannot be made.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise RecordError(f"{path}: the suffix says the format, and must be one of {', '.join(SUFFIXES)}")
+    try:
+        with path.open("wb" if force else "xb"):  # can.Logger would overwrite without a word
+            pass
+        writer = can.Logger(path)
+    except FileExistsError:
+        raise RecordError(f"{path}: is there already; give another name, or --force to overwrite it") from None
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be written: {error.strerror}") from error
+    assert isinstance(writer, can.io.generic.MessageWriter)
+    try:
+        yield writer
+    finally:
+        writer.stop()
+
+
+def _channel(spec: str) -> str:
+    """What the log calls the bus: can0, or for a unixbus the name of its folder."""
+    name = Path(split_spec(spec)[1]).name
+    return "".join(letter if letter.isalnum() else "_" for letter in name) or "bus"
+
+
+def run(recorder: Recorder, bus: can.BusABC, stop: StopFlag, duration: float | None) -> None:
+    """Until a signal comes or `duration` [s] is over; then what has come by then is still written.
+
+    Raises:
+        can.CanError: The bus has failed.
+        OSError: The log cannot be written, e.g. because the disk is full.
+    """
+    progress = _Progress()
+    end = None if duration is None else time.monotonic() + duration
+    try:
+        while not stop and (end is None or time.monotonic() < end):
+            message = bus.recv(_POLL_S)
+            if message is not None:
+                recorder.take(message)
+            if progress.is_due():
+                recorder.update(bus)
+                progress.show(f"canopy record: {recorder.summary.text()}")
+        limit = time.monotonic() + 1.0  # a bus that never falls silent
+        while time.monotonic() < limit and (message := bus.recv(0)) is not None:
+            recorder.take(message)
+        recorder.update(bus)
+    finally:
+        progress.end()
+
+
+def _record(spec: str, output: Path, model: Model | None, force: bool, duration: float | None) -> Recorder:
+    options = {"fd": True} if spec.startswith("socketcan:") else {}
+    with StopFlag() as stop, open_bus(spec, **options) as bus, open_log(output, force) as writer:
+        if isinstance(bus, SocketcanBus):  # the kernel gives as much of it as it likes
+            bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        recorder = Recorder(writer, output, _channel(spec), model)
+        click.echo(f"canopy record: {spec} to {output}  (Ctrl-C ends)", err=True)
+        run(recorder, bus, stop, duration)
+    return recorder
+
+
+@click.command(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="""\b
+Examples:
+  canopy record --can socketcan:can0 -o run.log
+  canopy record --can unixbus:bus0 -o run.blf --model nao_home.model.json --duration 60 --json
+""",
+)
+@click.option("--can", "bus_name", required=True, help="socketcan:vcan0, unixbus:bus0 or unixbus:/a/folder")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    required=True,
+    help="The log. Its suffix says the format: .log (candump's), .asc or .blf (Vector's).",
+)
+@click.option(
+    "--model", "model_path", type=click.Path(path_type=Path), help="<application>.model.json: counts ticks, too."
+)
+@click.option("--force", is_flag=True, help="Overwrite a file that is there.")
+@click.option("--duration", type=click.FloatRange(0, min_open=True), help="End after so many seconds.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as one line of JSON.")
+def command(
+    bus_name: str, output: Path, model_path: Path | None, force: bool, duration: float | None, as_json: bool
+) -> None:
+    """Record every frame of a CAN bus, with its time.
+
+    Start it before the controller: `canopy replay` needs the controller's first tick. It only listens. Progress and
+    what was lost are shown on stderr. Runs until Ctrl-C; a summary is printed at the end.
+
+    Exit status: 0 recorded, 1 the bus or the file cannot be used or the model is not the controller's, 2 wrong command
+    line.
+    """
+    try:
+        model = load_model(model_path) if model_path is not None else None
+        recorder = _record(bus_name, output, model, force, duration)
+    except (ModelError, RecordError, CanBusError, can.CanError, OSError) as error:
+        click.echo(f"canopy record: {error}", err=True)
+        sys.exit(1)
+    summary = recorder.summary
+    click.echo(json.dumps(asdict(summary)) if as_json else f"canopy record: {output}: {summary.text()}")
+    if recorder.decoder is not None and recorder.decoder.mismatch is not None:
+        sys.exit(1)

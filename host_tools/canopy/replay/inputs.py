@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: MIT
+"""Which frames of a log each tick has taken, as CanopyInputs tells: so many, with this check.
+
+Where the log's first frame is that the controller has taken, nobody says: the robot may have been sending for long. But
+the checks of the first ticks fit at one place only, unless the frames before it are the same ones anyway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from canopy.replay.log import LogError, Recording, Run, Taken, next_check
+
+_AHEAD = 64
+"""On a unixbus a frame may reach the log that much later than the controller's answer to it."""
+_SURE_FRAMES = 4
+"""So many frames with right checks are no accident: 1 in 2^32 is."""
+_SURE_BEHIND = 2
+"""So many more behind two that have changed places."""
+_STARTS_MENDED = 16
+_LOST_MAX = 255
+_STEPS_LATER = 8
+_TICKS_CUT = 2
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A tick that has taken frames."""
+
+    tick: int
+    frames: int
+    before: int
+    """The check before it."""
+    check: int
+
+
+class Inputs:
+    """The frames of a log that a run's first `ticks` ticks have taken."""
+
+    def __init__(self, recording: Recording, run: Run, ticks: int) -> None:
+        """Finds them.
+
+        Raises:
+            LogError: The log has other frames than the controller has taken.
+        """
+        self.ticks = ticks
+        """Ticks whose frames are all there: the log may end before those of the last one or two."""
+        self.reordered = 0
+        """How often two frames of different senders had to change places: a unixbus has not one order for all."""
+        self._path = recording.path
+        self._run = run
+        self._received = list(recording.received)
+        self._steps = list(_steps(run, ticks))
+        self._counts = [0] * ticks
+        for step in self._steps:
+            self._counts[step.tick] = step.frames
+        self._start = self._find_start()
+        del self._counts[self.ticks :]
+
+    def __iter__(self) -> Iterator[tuple[Taken, ...]]:
+        """The frames of each tick."""
+        place = self._start
+        for count in self._counts:
+            yield tuple(self._received[place : place + count])
+            place += count
+
+    def __len__(self) -> int:
+        return sum(self._counts)
+
+    def _find_start(self) -> int:
+        """The place of the first frame taken."""
+        if not self._steps:
+            return 0
+        near = max(0, self._run.before - self._steps[0].frames)
+        followed = []
+        for start in self._candidates(near):
+            steps = self._follow(start)
+            if steps == len(self._steps):
+                return start
+            if steps:
+                followed.append((steps, start))
+        followed.sort(key=lambda found: -found[0])  # stable: of equals the most likely one
+        error = None
+        for steps, start in followed[:_STARTS_MENDED]:
+            failure = self._mend_from(steps, start)
+            if failure is None:
+                return start
+            if error is None and sum(step.frames for step in self._steps[:steps]) >= _SURE_FRAMES:
+                error = failure
+        raise error or LogError(
+            f"{self._path}: the frames that the controller has taken in its first ticks are not in the log; start the "
+            "record before the controller"
+        )
+
+    def _mend_from(self, steps: int, start: int) -> LogError | None:
+        """Goes on behind so many steps that fit, and mends what can be mended. Else all is as before."""
+        before = list(self._received)
+        place = start + sum(step.frames for step in self._steps[:steps])
+        self.reordered = 0
+        for index in range(steps, len(self._steps)):
+            if self._is_cut(index, place):
+                break
+            if not self._fits(index, place) and not self._mend(index, place):
+                error = self._error(index, place)
+                self._received = before
+                return error
+            place += self._steps[index].frames
+        return None
+
+    def _candidates(self, near: int) -> Iterator[int]:
+        """Every place where the first frame may be, the most likely ones first."""
+        yield near
+        for distance in range(1, max(near, _AHEAD) + 1):
+            if distance <= near:
+                yield near - distance
+            if distance <= _AHEAD and near + distance <= len(self._received):
+                yield near + distance
+
+    def _fits(self, index: int, place: int) -> bool:
+        step = self._steps[index]
+        frames = self._received[place : place + step.frames]
+        check = step.before
+        for frame in frames:
+            check = next_check(check, frame.fold) if frame.fold is not None else check
+        return len(frames) == step.frames and check == step.check
+
+    def _follow(self, place: int) -> int:
+        """How many steps fit from the first one on, when the first of their frames is at `place`."""
+        for done, step in enumerate(self._steps):
+            if self._is_cut(done, place):
+                break
+            if not self._fits(done, place):
+                return done
+            place += step.frames
+        return len(self._steps)
+
+    def _is_cut(self, index: int, place: int) -> bool:
+        """Does the log end before these frames, shortly before the run does? Then what is behind is left out."""
+        step = self._steps[index]
+        if place + step.frames <= len(self._received) or len(self._counts) - step.tick > _TICKS_CUT:
+            return False
+        self.ticks = step.tick
+        return True
+
+    def _mend(self, index: int, place: int) -> bool:
+        """Lets two neighbours of different senders change places, where then this step and some further ones fit."""
+        for first in range(place, min(place + self._steps[index].frames, len(self._received) - 1)):
+            a, b = self._received[first], self._received[first + 1]
+            if a.sender != b.sender:
+                self._received[first : first + 2] = b, a
+                if self._is_sure(index, place, self._steps[index].frames + _SURE_BEHIND):
+                    self.reordered += 1
+                    return True
+                self._received[first : first + 2] = a, b
+        return False
+
+    def _is_sure(self, index: int, place: int, wanted: int) -> bool:
+        """Do this step and further ones fit, with so many frames, or to the end?"""
+        frames = 0
+        for last in range(index, len(self._steps)):
+            if frames >= wanted:
+                break
+            if place < 0 or not self._fits(last, place):
+                return False
+            place += self._steps[last].frames
+            frames += self._steps[last].frames
+        return True
+
+    def _error(self, index: int, place: int) -> LogError:
+        step = self._steps[index]
+        tick = self._run.ticks[step.tick].number
+        after = place + step.frames
+        first = self._received[place].place if place < len(self._received) else "the end"
+        where = f"{self._path}: tick {tick}, from frame {first} on: "
+        cut = f"; --ticks {step.tick} replays the ticks before it" if step.tick else ""
+        if after > len(self._received):
+            return LogError(f"{where}the log ends before all frames that the controller has taken{cut}")
+        lost = self._find_again(index, place)
+        if lost is None:
+            return LogError(f"{where}the log has other frames than the controller has taken{cut}")
+        if lost > 0:
+            return LogError(
+                f"{where}the controller has not taken {lost} of the frames that the log has: its CAN driver lost them"
+                + cut
+            )
+        if lost < 0:
+            return LogError(f"{where}the log lacks {-lost} of the frames that the controller has taken{cut}")
+        last = self._received[after - 1].place
+        return LogError(
+            f"{where}frames {first} to {last} are not those that the controller has taken: their bytes or their order "
+            f"are others{cut}"
+        )
+
+    def _find_again(self, index: int, place: int) -> int | None:
+        """By how many frames the log is ahead of the controller, once the steps fit again; None: they do not."""
+        sizes = (0, *(sign * size for size in range(1, _LOST_MAX + 1) for sign in (1, -1)))
+        for later in range(index + 1, min(index + 1 + _STEPS_LATER, len(self._steps) + 1)):
+            place += self._steps[later - 1].frames
+            for lost in sizes:
+                if self._is_sure(later, place + lost, 2 * _SURE_FRAMES):
+                    return lost
+        return None
+
+
+def _steps(run: Run, ticks: int) -> Iterator[_Step]:
+    taken = check = 0
+    for place, tick in enumerate(run.ticks[:ticks]):
+        frames = (tick.taken - taken) % 256
+        if frames or tick.check != check:
+            yield _Step(place, frames, check, tick.check)
+        taken, check = tick.taken, tick.check

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: MIT
+"""What a log of a bus says of one controller: its runs, tick by tick, with the frames that came in and went out.
+
+A run begins with the controller's tick 0. CanopyInputs gives the time of each tick and how many frames it has taken;
+the log is complete as long as the sequence numbers of the trace have no gap. All of it is kept in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import xor
+from pathlib import Path
+
+import can
+from cantools.database.can import Message as DbcMessage
+
+from canopy.model import Model, ModelError
+from canopy.signals import load_database
+from canopy.trace import mismatch
+from canopy.unixbus import encode
+
+_EXTENDED = 1 << 29
+_LAST_TICK = (1 << 32) - 1
+_NUMBERED = ("CanopyTick", "CanopyChange", "CanopySnapshot")
+SUFFIXES = (".log", ".asc", ".blf")
+
+
+class LogError(Exception):
+    """A log cannot be replayed; the text names the place in it, and the way out."""
+
+
+def key(identifier: int, extended: bool) -> int:
+    """One number for an arbitration id and its kind."""
+    return identifier | (_EXTENDED if extended else 0)
+
+
+class Bus:
+    """The controller's messages, by their key."""
+
+    def __init__(self, model: Model) -> None:
+        """Reads the DBC beside the model.
+
+        Raises:
+            ModelError: It cannot be used, or the controller does not trace what a replay needs.
+        """
+        database = load_database(model)
+        self.model = model
+        self.received: dict[int, DbcMessage] = {}
+        self.sent: dict[int, DbcMessage] = {}
+        """Commands and trace."""
+        self.trace: dict[int, str] = {}
+        """Which kind a trace message is."""
+        for need in ("CanopyTick", "CanopyInputs"):
+            if need not in model.trace:
+                raise ModelError(
+                    f"{model.path}: trace: has no {need}, without which nothing can be replayed: add it to the DBC as "
+                    "in docs/trace.md, build again, and record again"
+                )
+        for message in database.messages:
+            number = key(message.frame_id, message.is_extended_frame)
+            kind = message.name.partition("_")[0]
+            if model.trace.get(kind) == message.frame_id and model.bus_node in message.senders:
+                self.trace[number] = kind
+                self.sent[number] = message
+            elif message.name in model.send:
+                self.sent[number] = message
+            elif message.name in model.receive:
+                self.received[number] = message
+        if len(self.trace) != len(model.trace):
+            raise ModelError(f"{model.path}: trace: {model.dbc.name} does not have these messages: build again")
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A frame with the id of a message that the controller receives."""
+
+    place: int
+    """Number of the frame in the log, from 1."""
+    sender: str
+    """Who sends the message, by the DBC."""
+    datagram: bytes
+    """As the unixbus writes it."""
+    fold: int | None
+    """What it adds to CanopyInputs' Check; None when its form is not the message's."""
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A frame that the controller has sent."""
+
+    place: int
+    tick: int
+    data: bytes
+
+
+@dataclass
+class Tick:
+    """One tick, as CanopyTick and CanopyInputs tell."""
+
+    number: int
+    place: int
+    inputs: bytes = b""
+    """Of CanopyInputs; empty: not come yet."""
+
+    @property
+    def taken(self) -> int:
+        """Frames taken since the start, modulo 256."""
+        return self.inputs[6]
+
+    @property
+    def check(self) -> int:
+        """Of all frames taken since the start."""
+        return self.inputs[7]
+
+
+@dataclass
+class Run:
+    """From the controller's tick 0 to its end, to the log's end, or to the first gap."""
+
+    before: int
+    """How many frames that the controller receives are in the log before its tick 0."""
+    ticks: list[Tick] = field(default_factory=list)
+    sent: dict[int, list[Sent]] = field(default_factory=dict)
+    gap: str | None = None
+    """What is missing in the log behind the last tick; None: nothing."""
+    mismatch: str | None = None
+    """Why the model is not the controller's."""
+
+
+@dataclass
+class Recording:
+    """All of a log."""
+
+    path: Path
+    frames: int = 0
+    received: list[Taken] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    joined: int | None = None
+    """The log begins with this tick, in the middle of a run; None: no."""
+
+
+def next_check(check: int, fold: int) -> int:
+    """The running check after one more frame: canopy_bus_check() of the runtime."""
+    return ((check << 3) | (check >> 5)) & 0xFF ^ fold
+
+
+class _Reader:
+    """Takes the log's frames one by one."""
+
+    def __init__(self, bus: Bus, path: Path) -> None:
+        self.recording = Recording(path)
+        self._bus = bus
+        self._run: Run | None = None
+        self._sequence = 0
+        self._last_tick: int | None = None
+        self._commands: list[tuple[int, int, bytes]] = []
+        """Since the last trace frame: key, place, data. They belong to the CanopyTick that comes next."""
+
+    def take(self, message: can.Message) -> None:
+        """Takes frame number `recording.frames`."""
+        place = self.recording.frames
+        number = key(message.arbitration_id, message.is_extended_id)
+        if message.is_error_frame:
+            return
+        if number in self._bus.received:
+            self._take_received(message, place, self._bus.received[number])
+        elif number in self._bus.sent and not message.is_remote_frame:
+            data = bytes(message.data)
+            kind = self._bus.trace.get(number)
+            if kind is None:
+                self._commands.append((number, place, data))
+            elif len(data) != self._bus.sent[number].length:
+                self._break(f"frame {place} has the id of {kind}, but {len(data)} bytes")
+            else:
+                self._take_trace(kind, number, place, data)
+
+    def end(self) -> Recording:
+        """Leaves out the last tick where the log ends before its CanopyInputs."""
+        for run in self.recording.runs:
+            if run.ticks and not run.ticks[-1].inputs:
+                run.ticks.pop()
+        return self.recording
+
+    def _take_received(self, message: can.Message, place: int, known: DbcMessage) -> None:
+        try:
+            datagram = encode(message)
+        except ValueError as error:
+            raise LogError(f"{self.recording.path}: frame {place}: {error}") from error
+        fits = not message.is_remote_frame and message.is_fd == known.is_fd and message.dlc == known.length
+        fold = reduce(xor, message.data, message.arbitration_id & 0xFF) if fits else None
+        self.recording.received.append(Taken(place, known.senders[0] if known.senders else "", datagram, fold))
+
+    def _take_trace(self, kind: str, number: int, place: int, data: bytes) -> None:
+        if kind == "CanopyTick":
+            tick = int.from_bytes(data[1:5], "little")
+            wraps = self._last_tick == _LAST_TICK
+            self._last_tick = tick
+            if tick == 0 and data[0] == 0 and not wraps:
+                self._begin()
+            elif self.recording.joined is None and not self.recording.runs:
+                self.recording.joined = tick
+        if self._run is None:
+            return
+        if kind in _NUMBERED and not self._follows(kind, place, data):
+            return
+        if kind == "CanopyTick" and not self._add_tick(place, data):
+            return
+        if kind == "CanopyInputs":
+            if self._run.ticks[-1].inputs:
+                self._break(f"before frame {place} a CanopyTick is missing")
+                return
+            self._run.ticks[-1].inputs = data
+        elif kind == "CanopyModel" and self._run.mismatch is None:
+            self._run.mismatch = mismatch(self._bus.model, data)
+        self._run.sent.setdefault(number, []).append(Sent(place, len(self._run.ticks) - 1, data))
+
+    def _begin(self) -> None:
+        """Tick 0. Of each command only the last one is of this tick: before it the run before may have ended."""
+        self._run = Run(before=len(self.recording.received))
+        self.recording.runs.append(self._run)
+        self._sequence = 0
+        self._commands = list({command[0]: command for command in self._commands}.values())
+
+    def _follows(self, kind: str, place: int, data: bytes) -> bool:
+        missing = (data[0] - self._sequence) % 256
+        self._sequence = (data[0] + 1) % 256
+        if missing:
+            self._break(f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256")
+        return not missing
+
+    def _add_tick(self, place: int, data: bytes) -> bool:
+        assert self._run is not None
+        tick, ticks = int.from_bytes(data[1:5], "little"), self._run.ticks
+        if ticks and not ticks[-1].inputs:
+            self._break(f"before frame {place} CanopyInputs of tick {ticks[-1].number} is missing")
+            return False
+        if ticks and tick != ticks[-1].number + 1:
+            self._break(f"before frame {place} (tick {tick}) ticks are missing")
+            return False
+        ticks.append(Tick(tick, place))
+        for number, where, command in self._commands:
+            self._run.sent.setdefault(number, []).append(Sent(where, len(ticks) - 1, command))
+        self._commands.clear()
+        return True
+
+    def _break(self, gap: str) -> None:
+        """The run's last tick may lack frames, too: it is left out."""
+        if self._run is not None:
+            self._run.gap = gap
+            self._run.ticks.pop()
+            self._run = None
+
+
+def read_recording(path: Path, model: Model, channel: str | None = None) -> Recording:
+    """Reads a log.
+
+    Args:
+        path: A log in one of the formats of SUFFIXES.
+        model: Of the controller.
+        channel: Only the frames of this channel of the log; None: all, which must be of one.
+
+    Raises:
+        LogError: The log cannot be read, or holds several buses.
+        ModelError: The DBC cannot be used.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise LogError(f"{path}: the suffix says the format, and must be one of {', '.join(SUFFIXES)}")
+    reader = _Reader(Bus(model), path)
+    channels: set[str] = set()
+    try:
+        with can.LogReader(path) as log:
+            _take_all(reader, log, channel, channels)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (LogError, ModelError):
+        raise
+    except Exception as error:
+        # python-can lets the exceptions of its parsers through.
+        raise LogError(
+            f"{path}: is no {path.suffix} log behind frame {reader.recording.frames}: {error}; cut it there"
+        ) from error
+    if len(channels) > 1 and channel is None:
+        raise LogError(f"{path}: has frames of several buses ({', '.join(sorted(channels))}): choose with --channel")
+    return reader.end()
+
+
+def _take_all(reader: _Reader, log: Iterable[can.Message], channel: str | None, channels: set[str]) -> None:
+    for message in log:
+        if message.channel is not None:  # python-can forgets that of an error frame
+            channels.add(str(message.channel))
+        reader.recording.frames += 1
+        if channel is None or str(message.channel) == channel:
+            reader.take(message)

@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * A replay from memory: which frames a tick gets, when time moves, when it ends; and a run of nao_home that is recorded on
+ * its bus and replayed bit for bit, on a target too.
+ */
+#include "canopy/clock/replay.h"
+
+#include <string.h>
+
+#include "in_process.h"
+#include "nao_home_app.h"
+#include "unity.h"
+
+enum { INPUTS_ID = 0x604, SENSOR_ID = 0x100, FRAMES_MAX = 400, TICKS = 30 };
+
+/* A record in memory, and what was sent. */
+static struct {
+    canopy_can_frame_t record[FRAMES_MAX];
+    unsigned length;
+    unsigned next;
+    int end; /* what read says behind the last frame */
+    canopy_can_frame_t sent[FRAMES_MAX];
+    unsigned sent_count;
+    int write_result;
+} tape;
+
+static canopy_replay_t replay;
+
+static int read_tape(void *context, canopy_can_frame_t *frame)
+{
+    TEST_ASSERT_EQUAL_PTR(&tape, context);
+    if (tape.next == tape.length) {
+        return tape.end;
+    }
+    *frame = tape.record[tape.next++];
+    return 1;
+}
+
+static int write_tape(void *context, const canopy_can_frame_t *frame)
+{
+    TEST_ASSERT_EQUAL_PTR(&tape, context);
+    TEST_ASSERT_LESS_THAN_UINT(FRAMES_MAX, tape.sent_count);
+    tape.sent[tape.sent_count++] = *frame;
+    return tape.write_result;
+}
+
+static const canopy_replay_io_t io = {.context = &tape, .read = read_tape, .write = write_tape};
+static const canopy_trace_id_t inputs = {.id = INPUTS_ID};
+
+void setUp(void)
+{
+    tape.length = 0;
+    tape.next = 0;
+    tape.end = 0;
+    tape.sent_count = 0;
+    tape.write_result = 1;
+}
+
+void tearDown(void)
+{
+}
+
+static void put(canopy_can_frame_t frame)
+{
+    TEST_ASSERT_LESS_THAN_UINT(FRAMES_MAX, tape.length);
+    tape.record[tape.length++] = frame;
+}
+
+static void put_tick(canopy_time_t now)
+{
+    canopy_can_frame_t frame = {.id = INPUTS_ID, .length = 8, .data = {[6] = 77, [7] = 88}};
+
+    for (unsigned byte = 0; byte < 6u; byte++) {
+        frame.data[byte] = (uint8_t)((now >> (8u * byte)) & 0xFFu);
+    }
+    put(frame);
+}
+
+static void put_sensor(uint8_t value)
+{
+    put((canopy_can_frame_t){.id = SENSOR_ID, .length = 1, .data = {value}});
+}
+
+static canopy_time_t now(void)
+{
+    return replay.clock.now(replay.clock.context);
+}
+
+static bool wait_until(canopy_time_t deadline)
+{
+    return replay.clock.wait_until(replay.clock.context, deadline);
+}
+
+static void expect_sensor(uint8_t value)
+{
+    canopy_can_frame_t frame;
+
+    TEST_ASSERT_EQUAL(1, replay.can.receive(replay.can.context, &frame));
+    TEST_ASSERT_EQUAL_HEX32(SENSOR_ID, frame.id);
+    TEST_ASSERT_EQUAL_UINT8(value, frame.data[0]);
+}
+
+static void expect_no_frame(void)
+{
+    canopy_can_frame_t frame;
+
+    TEST_ASSERT_EQUAL(0, replay.can.receive(replay.can.context, &frame));
+}
+
+static void a_tick_gets_its_frames_at_its_time(void)
+{
+    canopy_can_stats_t stats;
+
+    put_tick(UINT64_C(0xA1A2A3A4A5A6));
+    put_sensor(1);
+    put_sensor(2);
+    put_tick(UINT64_C(0xA1A2A3A4A5A7));
+    put_tick(UINT64_C(0xA1A2A3A4FFFF));
+    put_sensor(3);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_TRUE(now() == UINT64_C(0xA1A2A3A4A5A6)); /* the loop's first deadline */
+    expect_no_frame();
+    TEST_ASSERT_TRUE(wait_until(now()));
+    TEST_ASSERT_TRUE(now() == UINT64_C(0xA1A2A3A4A5A6));
+    expect_sensor(1);
+    expect_sensor(2);
+    expect_no_frame();
+    expect_no_frame();
+    TEST_ASSERT_TRUE(wait_until(0)); /* whatever the deadline */
+    TEST_ASSERT_TRUE(now() == UINT64_C(0xA1A2A3A4A5A7));
+    expect_no_frame();
+    TEST_ASSERT_TRUE(wait_until(UINT64_MAX));
+    TEST_ASSERT_TRUE(now() == UINT64_C(0xA1A2A3A4FFFF));
+    expect_sensor(3);
+    expect_no_frame();
+    TEST_ASSERT_FALSE(wait_until(0));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_error(&replay));
+    replay.can.stats(replay.can.context, &stats);
+    TEST_ASSERT_EQUAL_UINT32(3, stats.received);
+    TEST_ASSERT_EQUAL_UINT32(0, stats.rx_dropped);
+    TEST_ASSERT_NULL(replay.can.wait);
+}
+
+static void what_a_tick_does_not_take_is_not_for_the_next(void)
+{
+    canopy_can_stats_t stats;
+
+    put_tick(1);
+    put_sensor(1);
+    put_sensor(2);
+    put_tick(2);
+    put_sensor(3);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_sensor(1);
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_sensor(3);
+    replay.can.stats(replay.can.context, &stats);
+    TEST_ASSERT_EQUAL_UINT32(1, stats.rx_dropped);
+}
+
+static void only_the_applications_own_message_begins_a_tick(void)
+{
+    put_tick(1);
+    put((canopy_can_frame_t){.id = INPUTS_ID, .flags = CANOPY_CAN_EXTENDED, .length = 8});
+    put((canopy_can_frame_t){.id = INPUTS_ID, .length = 7});
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_TRUE(wait_until(0));
+    for (unsigned frame = 0; frame < 2u; frame++) {
+        canopy_can_frame_t taken;
+
+        TEST_ASSERT_EQUAL(1, replay.can.receive(replay.can.context, &taken));
+        TEST_ASSERT_EQUAL_HEX32(INPUTS_ID, taken.id);
+    }
+    TEST_ASSERT_FALSE(wait_until(0));
+}
+
+static void what_cannot_be_replayed_is_refused(void)
+{
+    const canopy_trace_id_t off = {.id = CANOPY_TRACE_OFF};
+    const canopy_replay_io_t nothing = {.context = &tape};
+
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(NULL, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, NULL, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, &nothing, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED, canopy_replay_init(&replay, &io, off));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, inputs)); /* empty */
+    put_sensor(1);
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, inputs));
+    tape.end = CANOPY_ERROR_IO;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_init(&replay, &io, inputs));
+}
+
+static void an_error_ends_the_replay_and_is_told(void)
+{
+    const canopy_can_frame_t frame = {.id = 1};
+    canopy_can_stats_t stats;
+
+    put_tick(1);
+    put_tick(2);
+    tape.end = CANOPY_ERROR_IO;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_TRUE(wait_until(0));
+    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_no_frame();
+    TEST_ASSERT_FALSE(wait_until(0));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_error(&replay));
+
+    setUp();
+    put_tick(1);
+    put_tick(2);
+    tape.write_result = CANOPY_ERROR_BUS_DOWN;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_TRUE(wait_until(0));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_FALSE(wait_until(0));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, canopy_replay_error(&replay));
+    replay.can.stats(replay.can.context, &stats);
+    TEST_ASSERT_EQUAL_UINT32(0, stats.sent);
+    TEST_ASSERT_EQUAL_UINT32(1, stats.tx_dropped);
+}
+
+static void nobody_need_look_at_what_is_sent(void)
+{
+    const canopy_replay_io_t deaf = {.context = &tape, .read = read_tape};
+    const canopy_can_frame_t frame = {.id = 1};
+
+    put_tick(1);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &deaf, inputs));
+    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_EQUAL_UINT(0, tape.sent_count);
+}
+
+/* --- nao_home, recorded on its bus ---------------------------------------------------------------------------------- */
+
+static nao_in_process_t run;
+static canopy_can_frame_t recorded[FRAMES_MAX];
+
+/** Runs the mission with a silent spell; puts what came in on the tape, and keeps what went out. @return frames kept. */
+static unsigned record_the_mission(void)
+{
+    static canopy_can_frame_t queue[32];
+    static canopy_loopback_endpoint_t ear;
+    canopy_can_frame_t frame;
+    canopy_can_frame_t taken[4];
+    unsigned kept = 0;
+
+    TEST_ASSERT_EQUAL(CANOPY_OK, nao_in_process_init(&run, &nao_home_app));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&run.bus, &ear, queue, 32, NULL));
+    TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, 500, 0));
+    run.now = UINT64_C(123456789);
+    for (unsigned tick = 0; tick < (unsigned)TICKS; tick++) {
+        unsigned count = 0;
+
+        run.now += tick % 3u == 1u ? 777u : 0u; /* late, and once so late that its messages are stale */
+        run.now += tick == 6u ? 600000u : 0u;
+        if (tick == 6u) {
+            (void)canopy_loop_cycle(&run.loop, run.now); /* the robot is silent */
+            run.now += 50000u;
+        } else {
+            (void)nao_in_process_tick(&run);
+        }
+        while (ear.can.receive(ear.can.context, &frame) == 1) {
+            if (frame.id == nao_home_bus.rx[0].id || frame.id == nao_home_bus.rx[1].id) {
+                TEST_ASSERT_LESS_THAN_UINT(4, count);
+                taken[count++] = frame;
+                continue;
+            }
+            TEST_ASSERT_LESS_THAN_UINT(FRAMES_MAX, kept);
+            recorded[kept++] = frame;
+            if (frame.id == INPUTS_ID) {
+                put(frame);
+                for (unsigned place = 0; place < count; place++) {
+                    put(taken[place]);
+                }
+            }
+        }
+    }
+    return kept;
+}
+
+static void a_recorded_run_is_replayed_bit_for_bit(void)
+{
+    static canopy_loop_t loop;
+    static canopy_loop_config_t config;
+    unsigned kept = record_the_mission();
+
+    TEST_ASSERT_EQUAL_UINT32(1, nao_home_app.bus_state->counters.timeouts / 2u); /* both messages, once */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, nao_home_app.trace->inputs));
+    config = (canopy_loop_config_t){.app = &nao_home_app, .can = &replay.can, .clock = &replay.clock};
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL_UINT32(TICKS, loop.ticks);
+    TEST_ASSERT_EQUAL_UINT(kept + 2u, tape.sent_count); /* the safe commands at the end */
+    for (unsigned frame = 0; frame < kept; frame++) {
+        TEST_ASSERT_EQUAL_HEX32(recorded[frame].id, tape.sent[frame].id);
+        TEST_ASSERT_EQUAL_UINT8(recorded[frame].length, tape.sent[frame].length);
+        if (recorded[frame].id == nao_home_app.trace->tick.id) {
+            tape.sent[frame].data[7] = recorded[frame].data[7]; /* Overruns: a replay's clock measures nothing */
+        }
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(recorded[frame].data, tape.sent[frame].data, recorded[frame].length);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_tick_gets_its_frames_at_its_time);
+    RUN_TEST(what_a_tick_does_not_take_is_not_for_the_next);
+    RUN_TEST(only_the_applications_own_message_begins_a_tick);
+    RUN_TEST(what_cannot_be_replayed_is_refused);
+    RUN_TEST(an_error_ends_the_replay_and_is_told);
+    RUN_TEST(nobody_need_look_at_what_is_sent);
+    RUN_TEST(a_recorded_run_is_replayed_bit_for_bit);
+    return UNITY_END();
+}

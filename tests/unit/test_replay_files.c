@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * A replay's files: frames as they were written, what is no record, and what cannot be opened or written.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "canopy/clock/replay_files.h"
+#include "unity.h"
+
+enum { INPUTS_ID = 0x604 };
+
+static const canopy_trace_id_t inputs = {.id = INPUTS_ID};
+static canopy_replay_files_t files;
+static char message[CANOPY_REPLAY_MESSAGE];
+static char folder[64];
+static char record[100];
+static char sent[100];
+
+/* Bytes of a record: header (version, flags, length, 0, id), data. */
+static const uint8_t tick[] = {1, 0, 8, 0, 0x04, 0x06, 0, 0, 5, 4, 3, 2, 1, 0, 77, 88};
+static const uint8_t sensor[] = {1, 0, 2, 0, 0x00, 0x01, 0, 0, 0xAB, 0xCD};
+static const uint8_t request[] = {1, 2, 8, 0, 0x00, 0x01, 0, 0}; /* remote: a length, and no data */
+
+void setUp(void)
+{
+    message[0] = '\0';
+    (void)snprintf(folder, sizeof folder, "/tmp/canopy-test-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(record, sizeof record, "%s/record", folder);
+    (void)snprintf(sent, sizeof sent, "%s/sent", folder);
+}
+
+void tearDown(void)
+{
+    (void)unlink(record);
+    (void)unlink(sent);
+    (void)rmdir(folder);
+}
+
+static void append(const uint8_t *bytes, size_t size)
+{
+    FILE *file = fopen(record, "ab");
+
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_EQUAL(size, fwrite(bytes, 1, size, file));
+    TEST_ASSERT_EQUAL(0, fclose(file));
+}
+
+static canopy_error_t open_files(const char *to)
+{
+    return canopy_replay_open(&files, record, to, inputs, message, sizeof message);
+}
+
+static void test_frames_come_and_go_as_they_are(void)
+{
+    const canopy_can_t *can = &files.replay.can;
+    canopy_can_frame_t frame;
+    uint8_t written[sizeof sensor + 1u];
+    FILE *file;
+
+    append(tick, sizeof tick);
+    append(sensor, sizeof sensor);
+    append(request, sizeof request);
+    TEST_ASSERT_EQUAL_MESSAGE(CANOPY_OK, open_files(sent), message);
+    TEST_ASSERT_EQUAL_STRING("", message);
+    TEST_ASSERT_TRUE(files.replay.clock.wait_until(files.replay.clock.context, 0));
+    TEST_ASSERT_TRUE(files.replay.clock.now(files.replay.clock.context) == UINT64_C(0x000102030405));
+    TEST_ASSERT_EQUAL(1, can->receive(can->context, &frame));
+    TEST_ASSERT_EQUAL_HEX32(0x100, frame.id);
+    TEST_ASSERT_EQUAL_UINT8(2, frame.length);
+    TEST_ASSERT_EQUAL_HEX8(0xCD, frame.data[1]);
+    TEST_ASSERT_EQUAL(1, can->send(can->context, &frame));
+    TEST_ASSERT_EQUAL(1, can->receive(can->context, &frame));
+    TEST_ASSERT_EQUAL_HEX8(CANOPY_CAN_REMOTE, frame.flags);
+    TEST_ASSERT_EQUAL_UINT8(8, frame.length);
+    TEST_ASSERT_EQUAL(0, can->receive(can->context, &frame));
+    TEST_ASSERT_FALSE(files.replay.clock.wait_until(files.replay.clock.context, 0));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_close(&files));
+    file = fopen(sent, "rb");
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_EQUAL(sizeof sensor, fread(written, 1, sizeof written, file));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(sensor, written, sizeof sensor);
+    TEST_ASSERT_EQUAL(0, fclose(file));
+}
+
+static void test_nothing_need_be_written(void)
+{
+    const canopy_can_frame_t frame = {.id = 1};
+
+    append(tick, sizeof tick);
+    TEST_ASSERT_EQUAL(CANOPY_OK, open_files(NULL));
+    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, &frame));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_close(&files));
+}
+
+static void expect_refused(canopy_error_t error, const char *text)
+{
+    TEST_ASSERT_EQUAL(error, open_files(sent));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, text), message);
+    TEST_ASSERT_LESS_THAN(sizeof message - 1u, strlen(message)); /* not shortened */
+}
+
+static void test_what_cannot_be_opened_says_why(void)
+{
+    expect_refused(CANOPY_ERROR_NOT_FOUND, record);
+    append(sensor, sizeof sensor);
+    expect_refused(CANOPY_ERROR_NOT_FOUND, "canopy replay --keep");
+    TEST_ASSERT_EQUAL(0, unlink(record));
+    append(tick, sizeof tick - 1u);
+    expect_refused(CANOPY_ERROR_IO, "is no record");
+    TEST_ASSERT_EQUAL(0, unlink(record));
+    append(tick, 3);
+    expect_refused(CANOPY_ERROR_IO, "is no record");
+    TEST_ASSERT_EQUAL(0, unlink(record));
+    append(tick, sizeof tick);
+    (void)snprintf(sent, sizeof sent, "%s/none/sent", folder);
+    expect_refused(CANOPY_ERROR_IO, sent);
+    TEST_ASSERT_EQUAL(
+        CANOPY_ERROR_UNSUPPORTED,
+        canopy_replay_open(&files, record, NULL, (canopy_trace_id_t){.id = CANOPY_TRACE_OFF}, message, sizeof message));
+    TEST_ASSERT_NOT_NULL(strstr(message, "CanopyInputs"));
+}
+
+static void test_damage_within_a_record_ends_the_replay(void)
+{
+    static const uint8_t too_long[] = {1, 0, 200, 0, 0, 1, 0, 0};
+
+    append(tick, sizeof tick);
+    append(too_long, sizeof too_long);
+    TEST_ASSERT_EQUAL(CANOPY_OK, open_files(NULL));
+    TEST_ASSERT_TRUE(files.replay.clock.wait_until(files.replay.clock.context, 0));
+    TEST_ASSERT_FALSE(files.replay.clock.wait_until(files.replay.clock.context, 0));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_close(&files));
+}
+
+static void test_a_full_disk_is_told(void)
+{
+    const canopy_can_frame_t frame = {.id = 1};
+
+    append(tick, sizeof tick);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_open(&files, record, "/dev/full", inputs, message, sizeof message));
+    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, &frame)); /* into the buffer */
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_close(&files));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_frames_come_and_go_as_they_are);
+    RUN_TEST(test_nothing_need_be_written);
+    RUN_TEST(test_what_cannot_be_opened_says_why);
+    RUN_TEST(test_damage_within_a_record_ends_the_replay);
+    RUN_TEST(test_a_full_disk_is_told);
+    return UNITY_END();
+}
