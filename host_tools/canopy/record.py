@@ -25,6 +25,8 @@ SUFFIXES = (".log", ".asc", ".blf")
 """Formats that keep all of a frame: candump's, Vector's text, Vector's binary."""
 
 _POLL_S = 0.1
+_SILENT_S = 0.2  # at the end: what is on its way still comes
+_REST_S = 2.0
 _TERMINAL_PERIOD_S = 0.5
 _LINE_PERIOD_S = 10.0
 _RECEIVE_BUFFER = 4 << 20
@@ -185,8 +187,8 @@ def run(recorder: Recorder, bus: can.BusABC, stop: StopFlag, duration: float | N
             if progress.is_due():
                 recorder.update(bus)
                 progress.show(f"canopy record: {recorder.summary.text()}")
-        limit = time.monotonic() + 1.0  # a bus that never falls silent
-        while time.monotonic() < limit and (message := bus.recv(0)) is not None:
+        limit = time.monotonic() + _REST_S  # a bus that never falls silent
+        while time.monotonic() < limit and (message := bus.recv(_SILENT_S)) is not None:
             recorder.take(message)
         recorder.update(bus)
     finally:
