@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Runs the differing model: what BehaviorTree.CPP has to give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from differential.differences.node import bare
+from differential.differences.nodes import NODES
+from differential.differences.rules import BtCppWorld, ThrownError
+from differential.differences.scripts import Attributes
+from differential.model import COMPLETED, ModelTree
+from differential.tree import ATTRIBUTES, IDLE, Outcome, Tree
+
+
+@dataclass
+class Explained:
+    """What BehaviorTree.CPP has to give, and which rules fired in which outcome (numbered as the outcomes)."""
+
+    outcomes: list[Outcome]
+    thrown: bool
+    fired: list[set[str]]
+
+
+class BtCppTree(ModelTree):
+    """Halts every node when the whole tree is halted, RUNNING or not."""
+
+    world: BtCppWorld
+
+    def halt(self) -> Outcome:
+        for node in (self.root, *self.nodes):
+            if not isinstance(node, Attributes):
+                node.reset()
+                continue
+            if node.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None:
+                self.world.differs("on halted")
+            node.halt_node()
+        return self._outcome(None)
+
+
+def _shown_codes(differing: ModelTree) -> bytes:
+    return bytes([IDLE if isinstance(node, Attributes) else node.code for node in differing.nodes])
+
+
+def run_differing_model(tree: Tree) -> Explained:
+    """Runs the reference model with BehaviorTree.CPP's differences, up to an exception."""
+    world = BtCppWorld()
+    differing = BtCppTree(tree, world, NODES)
+    explained = Explained([], False, [])
+    for number in range(len(tree.times)):
+        try:
+            outcome = differing.tick(number)
+        except ThrownError:
+            explained.fired.append(world.fired)
+            explained.thrown = True
+            return explained
+        if outcome.status in COMPLETED:  # then BehaviorTree.CPP resets the root
+            differing.root.code = IDLE
+            bare(differing.root).code = IDLE
+        explained.outcomes.append(outcome._replace(codes=_shown_codes(differing)))
+        explained.fired.append(world.fired)
+        world.fired = set()
+        if tree.halt_after == number + 1:
+            explained.outcomes.append(differing.halt()._replace(codes=_shown_codes(differing)))
+            explained.fired.append(world.fired)
+            world.fired = set()
+    return explained
