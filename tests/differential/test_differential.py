@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import platform
 import random
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,17 +25,11 @@ from differential.engine import run_engine
 from differential.generate import DEPTH_MAX, NODES_MAX, Wanted, generate
 from differential.model import Node, run_model
 from differential.paper import acted, experiment
+from differential.platforms import needs_btcpp
 from differential.settings import BTCPP_TREES, DEFAULT_SEED, MODEL_TREES, SEED, TIMEOUT_S
 from differential.tree import ATTRIBUTES, FAILURE, HALTED, RUNNING, SHAPES, SUCCESS, Spec, Tree, engine_kinds
 
 Figure = Callable[[str], None]
-
-# As in host_tools/pyproject.toml: there is no package elsewhere, so nothing to compare with. Where there is one, it has
-# to be installed.
-needs_btcpp = pytest.mark.skipif(
-    sys.platform != "linux" or platform.machine() != "x86_64" or sys.version_info >= (3, 14),
-    reason="behaviortreepy is made for x86-64 Linux and Python up to 3.13 only",
-)
 
 ENGINE = Wanted(tuple(kind for kind in SHAPES if kind in engine_kinds()))
 

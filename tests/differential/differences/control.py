@@ -35,6 +35,11 @@ class AsyncSequence(InOrder, model.AsyncSequence):
 
 
 class SequenceWithMemory(InOrder, model.SequenceWithMemory):
+    def on_halt(self) -> None:
+        skipped = self.skipped
+        super().on_halt()
+        self.skipped = skipped
+
     def ended_by(self, status: int) -> int:
         for child in self.children[self.index :]:
             child.reset()

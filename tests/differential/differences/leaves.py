@@ -28,6 +28,10 @@ class StatefulAction(BtCppNode, model.StatefulAction):
             self.world.differs("skipped action")
         return status
 
+    def on_halt(self) -> None:
+        if self.code == RUNNING:
+            super().on_halt()
+
 
 class AlwaysSuccess(BtCppNode, model.AlwaysSuccess):
     pass

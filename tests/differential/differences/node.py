@@ -31,6 +31,11 @@ class BtCppNode(Node):
             self.on_halt()
         self.code = IDLE
 
+    def halt(self) -> None:
+        """Halts it, RUNNING or not: with the whole tree, all nodes are halted there."""
+        self.on_halt()
+        self.code = IDLE
+
     def keeps_count(self, skipped: list[Node]) -> None:
         """The node does not reset these children."""
         if any(isinstance(node, BtCppNode) and node.has_count() for node in map(bare, skipped)):

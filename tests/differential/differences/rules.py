@@ -16,9 +16,9 @@ RULES: dict[str, str] = {
     "skipped action": "a RUNNING action that answers SKIPPED stays RUNNING there",
     "attributes": "preconditions are asked of what is IDLE there: not of a SKIPPED inner node, nor of an old condition",
     "precondition": "Precondition does not ask again after a SKIPPED child or a halt, until its child has completed",
-    "loop goes on": "a Loop that was SKIPPED, or completed and was not reset, does not start its list again",
+    "loop goes on": "a Loop that was SKIPPED, or completed and was not reset, does not begin its list or child again",
     "on halted": "halting the whole tree runs every _onHalted, also of nodes that are not RUNNING",
-    "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped then",
+    "stale skips": "a Sequence or Fallback that completed and was not reset counts the children it skipped before",
 }
 """The differences that change what happens. What only looks different is in shown.py."""
 

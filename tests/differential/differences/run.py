@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from differential.differences.node import bare
+from differential.differences.node import BtCppNode, bare
 from differential.differences.nodes import NODES
 from differential.differences.rules import BtCppWorld, ThrownError
 from differential.differences.scripts import Attributes
@@ -29,12 +29,10 @@ class BtCppTree(ModelTree):
 
     def halt(self) -> Outcome:
         for node in (self.root, *self.nodes):
-            if not isinstance(node, Attributes):
-                node.reset()
-                continue
-            if node.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None:
+            assert isinstance(node, BtCppNode)
+            if isinstance(node, Attributes) and node.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None:
                 self.world.differs("on halted")
-            node.halt_node()
+            node.halt()
         return self._outcome(None)
 
 

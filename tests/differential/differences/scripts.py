@@ -40,9 +40,27 @@ class Precondition(Decorator, model.Precondition):
 
 
 class Loop(Decorator, model.Loop):
-    """Gets its list when it starts from IDLE; where a precondition has answered for it before that, it has none."""
+    """Gets its list when it starts from IDLE, and forgets then that its child was RUNNING when it was halted.
+
+    Where a precondition has answered for it before that, it has no list, or goes on with the old child.
+    """
 
     has_list = False
+    child_running = False
+
+    def child_runs(self) -> bool:
+        return self.child_running
+
+    def tick_children(self) -> int:
+        self.child_running = self.child_running and self.code != IDLE
+        if self.child_running and self.code in COMPLETED:
+            self.world.differs("loop goes on")
+        return super().tick_children()
+
+    def tick_child(self) -> int:
+        status = super().tick_child()
+        self.child_running = status == RUNNING
+        return status
 
     def starts(self) -> bool:
         if self.code in COMPLETED or (self.code == RUNNING and self.was_skipped):
@@ -97,11 +115,13 @@ class Attributes(BtCppNode, model.Attributes):
         if child.code == RUNNING:
             if was_skipped(child):
                 self.world.differs("attributes")
-            self.halt_node()
+            self.halt()
         child.reset()
         self.code = IDLE
 
-    def halt_node(self) -> None:
-        self.children[0].reset()
+    def halt(self) -> None:
+        child = self.children[0]
+        assert isinstance(child, BtCppNode)
+        child.halt()
         self.code = IDLE
         self.run("_onHalted")
