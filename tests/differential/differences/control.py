@@ -66,6 +66,8 @@ class Reactive(BtCppNode, model.Reactive):
         for child in self.children:
             status = child.tick()
             if status == SKIPPED:
+                if isinstance(child, BtCppNode) and child.has_count():
+                    self.world.differs("skipped count")
                 child.reset()
                 continue
             all_skipped = False

@@ -35,7 +35,20 @@ class ForceFailure(Decorator, model.ForceFailure):
 
 
 class Counting(Decorator, model.Counting):
+    def begin(self) -> None:
+        super().begin()
+        self.has_kept_count = False
+
+    def has_count(self) -> bool:
+        return self.cycles > 0 and self.spec.parameters[0] > 0
+
+    def keep_count(self) -> None:
+        self.has_kept_count = self.has_count()
+
     def tick_children(self) -> int:
+        if self.has_kept_count:
+            self.world.differs("skipped count")
+            self.has_kept_count = False
         while True:
             asynchronous = self.children[0].code != IDLE
             cycles = self.cycles
@@ -45,14 +58,6 @@ class Counting(Decorator, model.Counting):
             if not (asynchronous and self.cycles > cycles and status == RUNNING):
                 return status
             self.world.differs("same tick")
-
-    def has_count(self) -> bool:
-        return self.cycles > 0
-
-    def on_halt(self) -> None:
-        if self.was_skipped and self.cycles:
-            self.world.differs("skipped count")
-        super().on_halt()
 
 
 class Repeat(Counting, model.Repeat):

@@ -37,12 +37,16 @@ class BtCppNode(Node):
         self.code = IDLE
 
     def keeps_count(self, skipped: list[Node]) -> None:
-        """The node does not reset these children."""
-        if any(isinstance(node, BtCppNode) and node.has_count() for node in map(bare, skipped)):
-            self.world.differs("skipped count")
+        """The node does not reset these children, which ours does."""
+        for node in map(bare, skipped):
+            if isinstance(node, BtCppNode):
+                node.keep_count()
+
+    def keep_count(self) -> None:
+        """A Repeat or RetryUntilSuccessful goes on with its count when it is ticked the next time."""
 
     def has_count(self) -> bool:
-        """Whether it is a Repeat or RetryUntilSuccessful that has counted a cycle."""
+        """Whether it is a Repeat or RetryUntilSuccessful that would lose its count if it were halted."""
         return False
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from differential.differences.node import BtCppNode, bare
+from differential.differences.node import BtCppNode, bare, was_skipped
 from differential.differences.nodes import NODES
 from differential.differences.rules import BtCppWorld, ThrownError
 from differential.differences.scripts import Attributes
 from differential.model import COMPLETED, ModelTree
-from differential.tree import ATTRIBUTES, IDLE, Outcome, Tree
+from differential.tree import IDLE, RUNNING, Outcome, Tree
 
 
 @dataclass
@@ -28,11 +28,17 @@ class BtCppTree(ModelTree):
     world: BtCppWorld
 
     def halt(self) -> Outcome:
-        for node in (self.root, *self.nodes):
+        assert isinstance(self.root, BtCppNode)
+        root_runs = self.root.code == RUNNING and not was_skipped(self.root)
+        expected = list(self.world.entries)
+        self.root.halt()
+        if root_runs:
+            expected = list(self.world.entries)
+        for node in self.nodes:
             assert isinstance(node, BtCppNode)
-            if isinstance(node, Attributes) and node.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None:
-                self.world.differs("on halted")
             node.halt()
+        if self.world.entries != expected:
+            self.world.differs("on halted")
         return self._outcome(None)
 
 

@@ -7,7 +7,7 @@ from differential import model
 from differential.differences.decorators import Decorator
 from differential.differences.node import BtCppNode, was_skipped
 from differential.model import COMPLETED, Node
-from differential.tree import IDLE, RUNNING, SKIPPED
+from differential.tree import ATTRIBUTES, IDLE, RUNNING, SKIPPED
 
 
 class Script(BtCppNode, model.Script):
@@ -98,11 +98,17 @@ class Attributes(BtCppNode, model.Attributes):
 
     def tick(self) -> int:
         child = self.children[0]
-        if child.code in COMPLETED or (child.code == RUNNING and was_skipped(child)):
-            self.world.differs("attributes")
+        expected = self.before_start()
+        ran = child.code == RUNNING
         status = None if child.code in COMPLETED else self.precondition()
+        if child.code in COMPLETED or (ran and was_skipped(child)):
+            halted = ran and status is not None
+            if status != expected or (halted and self.has_on_halted()):
+                self.world.differs("attributes")
         if status is None:
             status = child.tick()
+            if status == SKIPPED:
+                self.keeps_count([child])
         elif status in COMPLETED:
             child.code = status
         self.completed(status)
@@ -110,10 +116,13 @@ class Attributes(BtCppNode, model.Attributes):
         self.was_skipped = status == SKIPPED
         return status
 
+    def has_on_halted(self) -> bool:
+        return self.spec.scripts[ATTRIBUTES.index("_onHalted")] is not None
+
     def reset(self) -> None:
         child = self.children[0]
         if child.code == RUNNING:
-            if was_skipped(child):
+            if was_skipped(child) and self.has_on_halted():
                 self.world.differs("attributes")
             self.halt()
         child.reset()
