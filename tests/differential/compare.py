@@ -136,6 +136,7 @@ def _engine_differs(tree: Tree, explained: Explained, ours: list[Outcome], run: 
                 f"outcome {number}, no rule fired:\n  engine: {outcome_text(our)}\n"
                 f"  BehaviorTree.CPP: {outcome_text(their)}"
             )
+        tally.identical += not ways
         tally.shown.update(ways)
     tally.trees += 1
     tally.ticks += ticks

@@ -33,14 +33,15 @@ class Tally:
 
     `ticks`: those that the trees have, run or not: after an exception BehaviorTree.CPP runs no more. `strict_ticks`:
     those before the first rule fired, in which engine and BehaviorTree.CPP have to be the same. `strict_trees`: trees
-    in which no rule fired. `excused`: the other ticks, at the first rule that fired. `shown`: strict ticks in which a
-    status was shown otherwise, at each way of it (shown.SHOWN).
+    in which no rule fired. `excused`: the other ticks, at the first rule that fired. `identical`: strict ticks in
+    which every status was the same. `shown`: those in which one was shown otherwise, at each way of it (shown.SHOWN).
     """
 
     trees: int = 0
     ticks: int = 0
     strict_trees: int = 0
     strict_ticks: int = 0
+    identical: int = 0
     thrown: int = 0
     excused: defaultdict[str, Excused] = field(default_factory=lambda: defaultdict(Excused))
     shown: Counter[str] = field(default_factory=Counter)
@@ -69,6 +70,6 @@ class Tally:
                 )
         total = [sum(getattr(row, name) for row in self.excused.values()) for name in ("trees_same", "same")]
         rows.append(f"  {'all':28}{self.trees:8}{self.ticks:18}{100:8.2f} %{total[0]:24}{total[1]:10}")
-        rows.append("  strict ticks with a status shown otherwise: ")
-        rows[-1] += "; ".join(f"{name} {self.shown[name]}" for name in SHOWN)
+        shown = "; ".join(f"{name} {self.shown[name]}" for name in SHOWN)
+        rows.append(f"  strict ticks with every status the same {self.identical}; shown otherwise: {shown}")
         return rows
