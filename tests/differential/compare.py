@@ -7,17 +7,18 @@ import os
 import pickle
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from differential.differences import Explained, run_differing_model
 from differential.engine import run_engine
 from differential.model import run_model
-from differential.shown import shown_alike
+from differential.shown import Shown
 from differential.shrink import shrink
+from differential.tally import Tally
 from differential.tree import CALL_NAMES, ENTRIES, STATUS_NAMES, Outcome, Result, Tree, code_name
 
 BATCH = 500
@@ -25,13 +26,11 @@ BATCH = 500
 
 @dataclass
 class Report:
-    """What was compared. `direct`: ticks of BehaviorTree.CPP compared with the engine itself."""
+    """What was compared. `tally`: how strictly, with BehaviorTree.CPP."""
 
     trees: int = 0
     ticks: int = 0
-    direct: int = 0
-    thrown: int = 0
-    first_rules: Counter[str] = field(default_factory=Counter)
+    tally: Tally = field(default_factory=Tally)
     failures: list[tuple[Tree, str]] = field(default_factory=list)
 
 
@@ -96,8 +95,15 @@ def compare_with_model(runner: Path, trees: list[Tree], model: Model = run_model
 Differing = Callable[[Tree], Explained]
 
 
-def run_btcpp(trees: list[Tree]) -> list[tuple[list[Outcome], str]]:
-    """Runs trees in BehaviorTree.CPP: for each the outcomes, and the message of the exception that ended it, or ""."""
+class BtCppRun(NamedTuple):
+    """The outcomes of one tree, and the message of the exception that ended it, or ""."""
+
+    outcomes: list[Outcome]
+    thrown: str
+
+
+def run_btcpp(trees: list[Tree]) -> list[BtCppRun]:
+    """Runs trees in BehaviorTree.CPP."""
     folder = str(Path(__file__).parents[1])
     process = subprocess.run(
         [sys.executable, "-m", "differential.btcpp_runner"],
@@ -107,23 +113,42 @@ def run_btcpp(trees: list[Tree]) -> list[tuple[list[Outcome], str]]:
         check=True,
         timeout=600,
     )
-    results: list[tuple[list[Outcome], str]] = pickle.loads(process.stdout)
-    return results
+    return [BtCppRun(*result) for result in pickle.loads(process.stdout)]
 
 
-def _directly_compared(tree: Tree, explained: Explained, ours: list[Outcome], theirs: list[Outcome]) -> int | str:
-    """Number of outcomes before the first rule fired, all found alike; else the first that is not, in words."""
-    for number, (our, their) in enumerate(zip(ours, theirs, strict=False)):
-        if explained.fired[number]:
-            return number
-        alike = our.status == their.status and our.calls == their.calls and our.entries == their.entries
-        alike = alike and shown_alike(tree, our, their)
-        if not alike:
+def _ways_shown(shown: Shown, our: Outcome, their: Outcome) -> set[str] | None:
+    """In which ways statuses are shown otherwise after a tick that is the same; None when it is not."""
+    if (our.status, our.calls, our.entries) != (their.status, their.calls, their.entries):
+        return None
+    return shown.otherwise(our, their)
+
+
+def _engine_differs(tree: Tree, explained: Explained, ours: list[Outcome], run: BtCppRun, tally: Tally) -> str | None:
+    """The first tick before any rule fired in which engine and BehaviorTree.CPP differ, in words. Counts the ticks."""
+    shown = Shown(tree)
+    theirs = run.outcomes
+    ticks = len(ours)  # those that BehaviorTree.CPP did not run any more included
+    strict = next((number for number, fired in enumerate(explained.fired) if fired), ticks)
+    for number, (our, their) in enumerate(zip(ours[:strict], theirs, strict=False)):
+        ways = _ways_shown(shown, our, their)
+        if ways is None:
             return (
                 f"outcome {number}, no rule fired:\n  engine: {outcome_text(our)}\n"
                 f"  BehaviorTree.CPP: {outcome_text(their)}"
             )
-    return min(len(ours), len(theirs))
+        tally.identical += not ways
+        tally.shown.update(ways)
+    tally.trees += 1
+    tally.ticks += ticks
+    tally.strict_ticks += strict
+    tally.thrown += bool(run.thrown)
+    if strict == ticks:
+        tally.strict_trees += 1
+        return None
+    rest = zip(ours[strict:], theirs[strict:], strict=False)
+    same = sum(_ways_shown(shown, our, their) is not None for our, their in rest)
+    tally.excuse(explained.fired[strict], ticks - strict, same)
+    return None
 
 
 def compare_with_btcpp(runner: Path, trees: list[Tree], differing: Differing = run_differing_model) -> Report:
@@ -140,27 +165,21 @@ def _add_batches(
     report: Report,
     runner: Path,
     batches: list[list[Tree]],
-    results: Iterator[list[tuple[list[Outcome], str]]],
+    results: Iterator[list[BtCppRun]],
     differing: Differing,
 ) -> None:
     for batch, result in zip(batches, results, strict=True):
-        for tree, engine, (theirs, thrown) in zip(batch, run_engine(runner, batch), result, strict=True):
-            ours = engine.outcomes
+        for tree, engine, run in zip(batch, run_engine(runner, batch), result, strict=True):
             explained = differing(tree)
             report.trees += 1
-            report.ticks += len(theirs)
-            report.thrown += bool(thrown)
-            report.first_rules.update(next((fired for fired in explained.fired if fired), ()))
-            difference = first_difference({"BehaviorTree.CPP": theirs, "expected of it": explained.outcomes})
-            if difference is None and bool(thrown) != explained.thrown:
-                difference = f"BehaviorTree.CPP threw {thrown!r}; an exception was expected: {explained.thrown}"
-            compared = _directly_compared(tree, explained, ours, theirs)
-            if difference is None and isinstance(compared, str):
-                difference = compared
+            report.ticks += len(run.outcomes)
+            difference = first_difference({"BehaviorTree.CPP": run.outcomes, "expected of it": explained.outcomes})
+            if difference is None and bool(run.thrown) != explained.thrown:
+                difference = f"BehaviorTree.CPP threw {run.thrown!r}; an exception was expected: {explained.thrown}"
+            if difference is None:
+                difference = _engine_differs(tree, explained, engine.outcomes, run, report.tally)
             if difference:
                 report.failures.append((tree, difference))
-            elif isinstance(compared, int):
-                report.direct += compared
 
 
 # --- What a failure says ----------------------------------------------------------------------------------------------

@@ -50,6 +50,10 @@ class Attributes(Decorator):
             self.reset_all()
             self.run("_onHalted")
             return SKIPPED
+        return self.before_start()
+
+    def before_start(self) -> int | None:
+        """The status that a precondition gives when the node is not RUNNING."""
         if self.run("_failureIf"):
             return FAILURE
         if self.run("_successIf"):
