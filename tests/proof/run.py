@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs Frama-C: EVA on the engine, the validator, the loop and the codecs, WP on the rings' and the validator's contracts.
+"""Runs Frama-C: EVA on the engine, the validator, the loop and the codecs, WP on the rings' and validator's contracts.
 
 usage: run.py [--jobs N] [--only WORD] [--all]
 
@@ -119,8 +119,8 @@ def all_runs(every_inner: bool) -> list[Run]:
 
 
 def leave_out_contracts() -> None:
-    """EVA would give an alarm for each contract that it cannot see, and rely on it: it gets the same lines without them."""
-    for path in sorted(Path("runtime").rglob("*.[ch]")):
+    """EVA would give an alarm for each contract that it cannot prove, and rely on it: it gets none of them."""
+    for path in sorted(Path("runtime").rglob("*.*")):
         (PLAIN / path).parent.mkdir(parents=True, exist_ok=True)
         text = path.read_text(encoding="utf-8")
         text = re.sub(r"/\*@.*?\*/|//@[^\n]*", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
@@ -177,7 +177,9 @@ def judge_wp(log: str) -> tuple[str, list[str]]:
 def prove(run: Run) -> bool:
     """One run; True when all is proved."""
     started = time.monotonic()
-    result = subprocess.run(run.command(), cwd=None if run.wp else PLAIN, capture_output=True, text=True, check=False)
+    folder = Path.cwd() if run.wp else PLAIN.resolve()
+    environment = {**os.environ, "PWD": str(folder)}  # Frama-C goes by this
+    result = subprocess.run(run.command(), cwd=folder, env=environment, capture_output=True, text=True, check=False)
     log = result.stdout + result.stderr
     (OUT / f"{re.sub('[^A-Za-z0-9]+', '_', run.name)}.log").write_text(log, encoding="utf-8")
     summary, wrong = judge_wp(log) if run.wp else judge_eva(run, log)

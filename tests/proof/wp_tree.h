@@ -45,9 +45,9 @@
 /* Each type by its number: WP proves what is said of a constant, not of each place in a table. */
 #define CANOPY_EACH_TYPE(is, and)                                                                                      \
     (is(0) and is(1) and is(2) and is(3) and is(4) and is(5) and is(6) and is(7) and is(8) and is(9) and is(10)        \
-     and is(11) and is(12) and is(13) and is(14) and is(15) and is(16) and is(17) and is(18) and is(19) and is(20)     \
-     and is(21) and is(22) and is(23) and is(24) and is(25) and is(26) and is(27) and is(28) and is(29) and is(30)     \
-     and is(31) and is(32) and is(33) and is(34) and is(35) and is(36) and is(37))
+         and is(11) and is(12) and is(13) and is(14) and is(15) and is(16) and is(17) and is(18) and is(19) and is(20) \
+             and is(21) and is(22) and is(23) and is(24) and is(25) and is(26) and is(27) and is(28) and is(29)        \
+                 and is(30) and is(31) and is(32) and is(33) and is(34) and is(35) and is(36) and is(37))
 
 /* The tables: each is there as long as its count says; validate() also takes NULL. */
 /*@ predicate canopy_tables_readable(canopy_tree_t *tree) =
