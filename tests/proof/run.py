@@ -104,6 +104,8 @@ def all_runs(every_inner: bool) -> list[Run]:
             ["-wp-no-init-const", "-wp-skip-fct",
              "shapes_of_nodes_def,canopy_time_reached,canopy_tree_status,canopy_tree_status_code"], wp=True),
         Run("wp shapes", [f"{HERE}/wp_validate.c"], ["-wp-fct", "shapes_of_nodes_def"], wp=True),
+        Run("wp walks", [f"{HERE}/wp_walks.c"],
+            ["-wp-fct", "canopy_count_children,canopy_parallel_open_child,canopy_try_catch_handler"], wp=True),
         Run("loop, bus, trace", [f"{HERE}/eva_loop.c", *loop, *generated, "examples/nao/home_leaves.c"], LOOP,
             include=[str(application)]),
         Run("e2e, time", [f"{HERE}/eva_e2e.c", "runtime/src/e2e.c"],

@@ -160,4 +160,20 @@
         \forall integer node; 0 <= node < tree->node_count ==> canopy_node_is(tree, node);
 */
 
+/* For the engine's walks over children. */
+/*@ predicate canopy_instance_is_sound(canopy_tree_instance_t *self) =
+        \valid_read(self) && canopy_well_formed(self->tree) &&
+        \valid(self->status + (0 .. self->tree->node_count - 1));
+
+    predicate canopy_is_child(canopy_node_t *nodes, integer node, integer child) =
+        node < child < nodes[node].end && nodes[child].parent == node;
+
+    predicate canopy_is_child_or_end(canopy_node_t *nodes, integer node, integer child) =
+        canopy_is_child(nodes, node, child) || child == nodes[node].end;
+
+    predicate canopy_walks(canopy_tree_t *tree, integer node, integer child) =
+        canopy_is_child_or_end(tree->nodes, node, child) && canopy_place_is(tree->nodes, tree->node_count, node) &&
+        (child < tree->nodes[node].end ==> canopy_place_is(tree->nodes, tree->node_count, child));
+*/
+
 #endif
