@@ -18,7 +18,22 @@ static const canopy_shape_t shapes[CANOPY_NODE_TYPES] = {
 #undef CANOPY_NODE
 };
 
+/*@ predicate canopy_shapes_fit =
+        \valid_read(&shapes[0 .. CANOPY_NODE_TYPES - 1]) && \forall integer type; 0 <= type < CANOPY_NODE_TYPES ==>
+        canopy_shape_is(type, shapes[type].least, shapes[type].most, shapes[type].words, shapes[type].parameters);
+*/
+
+/*
+ * The comments that begin with an at sign are contracts in ACSL, which Frama-C's WP proves (docs/verification.md); the
+ * words in them are explained in tests/proof/wp_tree.h.
+ */
+
 /** Is parameter `which` of the node a script, or none where that is allowed? */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->parameter + which < tree->parameter_count;
+    assigns \nothing;
+    ensures \result == true ==> canopy_script_is(tree, node, which, least);
+*/
 static bool script_fits(const canopy_tree_t *tree, const canopy_node_t *node, unsigned which, int32_t least)
 {
     int32_t script = tree->parameters[node->parameter + which];
@@ -27,6 +42,11 @@ static bool script_fits(const canopy_tree_t *tree, const canopy_node_t *node, un
 }
 
 /** Is parameter `which` of the node a status that a node can return? */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->parameter + which < tree->parameter_count;
+    assigns \nothing;
+    ensures \result == true ==> canopy_status_is(tree, node, which);
+*/
 static bool status_fits(const canopy_tree_t *tree, const canopy_node_t *node, unsigned which)
 {
     int32_t status = tree->parameters[node->parameter + which];
@@ -35,8 +55,21 @@ static bool status_fits(const canopy_tree_t *tree, const canopy_node_t *node, un
 }
 
 /** All parameters of the node from `first` on are scripts, or none. */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->type < CANOPY_NODE_TYPES;
+    requires node->parameter + shapes[node->type].parameters <= tree->parameter_count;
+    assigns \nothing;
+    ensures \result == true ==> \forall integer which; first <= which < shapes[node->type].parameters ==>
+            canopy_script_is(tree, node, which, -1);
+*/
 static bool scripts_fit(const canopy_tree_t *tree, const canopy_node_t *node, unsigned first)
 {
+    /*@ loop invariant first <= which;
+        loop invariant \forall integer checked; first <= checked < which ==>
+                       canopy_script_is(tree, node, checked, -1);
+        loop assigns which;
+        loop variant shapes[node->type].parameters - which;
+    */
     for (unsigned which = first; which < shapes[node->type].parameters; which++) {
         if (!script_fits(tree, node, which, -1)) {
             return false;
@@ -46,8 +79,22 @@ static bool scripts_fit(const canopy_tree_t *tree, const canopy_node_t *node, un
 }
 
 /** Parameters that a script gives: the script is there. */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->type < CANOPY_NODE_TYPES;
+    requires shapes[node->type].parameters > 0 ==>
+             node->parameter + shapes[node->type].parameters <= tree->parameter_count;
+    assigns \nothing;
+    ensures \result == true ==> \forall integer which; 0 <= which < 8 && canopy_asks(node, which) ==>
+            which < shapes[node->type].parameters && canopy_script_is(tree, node, which, 0);
+*/
 static bool asked_fit(const canopy_tree_t *tree, const canopy_node_t *node)
 {
+    /*@ loop invariant 0 <= which <= 8;
+        loop invariant \forall integer checked; 0 <= checked < which && canopy_asks(node, checked) ==>
+                       checked < shapes[node->type].parameters && canopy_script_is(tree, node, checked, 0);
+        loop assigns which;
+        loop variant 8 - which;
+    */
     for (unsigned which = 0; which < 8u; which++) {
         if (((node->asks >> which) & 1u) != 0u &&
             (which >= shapes[node->type].parameters || !script_fits(tree, node, which, 0))) {
@@ -58,12 +105,22 @@ static bool asked_fit(const canopy_tree_t *tree, const canopy_node_t *node)
 }
 
 /** Is the type one whose parameters are scripts and statuses themselves? */
+/*@ assigns \nothing;
+    ensures \result == true <==> CANOPY_NODE_PRECONDITION <= type <= CANOPY_NODE_SWITCH;
+*/
 static bool is_scripted(uint8_t type)
 {
     return type >= (uint8_t)CANOPY_NODE_PRECONDITION && type <= (uint8_t)CANOPY_NODE_SWITCH;
 }
 
 /** Parameters that name scripts and statuses; the parameters themselves are known to be there. */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->type < CANOPY_NODE_TYPES && canopy_shapes_fit;
+    requires canopy_type_parameters(node->type) > 0 ==>
+             node->parameter + canopy_type_parameters(node->type) <= tree->parameter_count;
+    assigns \nothing;
+    ensures \result == true ==> canopy_meaning_is(tree, node);
+*/
 static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
 {
     const uint8_t type = node->type;
@@ -89,6 +146,10 @@ static bool meaning_fits(const canopy_tree_t *tree, const canopy_node_t *node)
 }
 
 /** A node of the user's own has the functions that its kind needs. */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    assigns \nothing;
+    ensures \result == true ==> canopy_functions_are(tree, node);
+*/
 static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
 {
     const uint8_t type = node->type;
@@ -112,6 +173,13 @@ static bool functions_fit(const canopy_tree_t *tree, const canopy_node_t *node)
  * The node's own state words: after those of the nodes before it. Shared words would be the one way to make a node
  * resume at what is not its child.
  */
+/*@ requires \valid_read(tree) && \valid_read(node) && \valid(words_end);
+    requires node->type < CANOPY_NODE_TYPES && canopy_shapes_fit;
+    assigns *words_end;
+    ensures \result == true && canopy_type_words(node->type) == 0 ==> *words_end == \old(*words_end);
+    ensures \result == true && canopy_type_words(node->type) > 0 ==> \old(*words_end) <= node->state &&
+            *words_end == canopy_words_end(node) <= tree->word_count;
+*/
 static bool words_fit(const canopy_tree_t *tree, const canopy_node_t *node, uint32_t *words_end)
 {
     const uint8_t words = shapes[node->type].words;
@@ -127,6 +195,11 @@ static bool words_fit(const canopy_tree_t *tree, const canopy_node_t *node, uint
 }
 
 /** The node's own fields: its parameters, its functions. */
+/*@ requires canopy_tables_there(tree) && \valid_read(node);
+    requires node->type < CANOPY_NODE_TYPES && canopy_shapes_fit && shape == &shapes[node->type];
+    assigns \nothing;
+    ensures \result == true ==> canopy_fields_are(tree, node);
+*/
 static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, const canopy_shape_t *shape)
 {
     return (shape->parameters == 0u || (uint32_t)node->parameter + shape->parameters <= tree->parameter_count) &&
@@ -134,12 +207,27 @@ static bool fields_fit(const canopy_tree_t *tree, const canopy_node_t *node, con
 }
 
 /** The children: each lies within the node, names it as parent, and their number suits the type. */
+/*@ requires canopy_tables_there(tree) && index < tree->nodes[index].end <= tree->node_count;
+    requires tree->nodes[index].type < CANOPY_NODE_TYPES && canopy_shapes_fit;
+    requires shape == &shapes[tree->nodes[index].type];
+    assigns \nothing;
+    ensures \result == true ==> canopy_chain(tree->nodes, index, index + 1) && canopy_arity_is(tree->nodes, index);
+*/
 static bool children_fit(const canopy_tree_t *tree, uint16_t index, const canopy_shape_t *shape)
 {
     const canopy_node_t *nodes = tree->nodes;
     uint16_t children = 0;
     uint16_t child = (uint16_t)(index + 1u);
 
+    /*@ loop invariant index < child <= nodes[index].end && children < child - index;
+        loop invariant canopy_chain(nodes, index, child) ==> canopy_chain(nodes, index, index + 1);
+        loop invariant children == 0 <==> child == index + 1;
+        loop invariant children >= 1 ==> index + 1 < nodes[index].end && nodes[index + 1].end <= child;
+        loop invariant children == 1 ==> nodes[index + 1].end == child;
+        loop invariant children >= 2 ==> nodes[index + 1].end < nodes[index].end;
+        loop assigns child, children;
+        loop variant nodes[index].end - child;
+    */
     while (child < nodes[index].end) {
         if (nodes[child].parent != index || nodes[child].end <= child || nodes[child].end > nodes[index].end) {
             return false;
@@ -151,6 +239,12 @@ static bool children_fit(const canopy_tree_t *tree, uint16_t index, const canopy
 }
 
 /** The last child of a TryCatch that ticks it when it is halted is a leaf with functions. */
+/*@ requires canopy_tables_there(tree) && index < tree->nodes[index].end <= tree->node_count;
+    requires canopy_fields_are(tree, &tree->nodes[index]) && canopy_arity_is(tree->nodes, index);
+    requires canopy_chain(tree->nodes, index, index + 1);
+    assigns \nothing;
+    ensures \result == true ==> canopy_handler_is(tree, index);
+*/
 static bool handler_fits(const canopy_tree_t *tree, uint16_t index)
 {
     const canopy_node_t *node = &tree->nodes[index];
@@ -159,12 +253,23 @@ static bool handler_fits(const canopy_tree_t *tree, uint16_t index)
     if (node->type != (uint8_t)CANOPY_NODE_TRY_CATCH || (node->asks == 0u && tree->parameters[node->parameter] == 0)) {
         return true;
     }
+    /*@ loop invariant canopy_chain(tree->nodes, index, handler);
+        loop invariant index < handler < node->end;
+        loop assigns handler;
+        loop variant node->end - handler;
+    */
     while (tree->nodes[handler].end != node->end) {
         handler = tree->nodes[handler].end;
     }
     return tree->nodes[handler].type <= (uint8_t)CANOPY_NODE_STATEFUL_ACTION;
 }
 
+/*@ requires tree == \null || canopy_tables_readable(tree);
+    requires bad_node == \null || \valid(bad_node);
+    requires canopy_shapes_fit;
+    assigns *bad_node;
+    ensures \result == CANOPY_OK ==> canopy_well_formed(tree) && *bad_node == \old(*bad_node);
+*/
 canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_node)
 {
     uint32_t words_end = 0;
@@ -175,9 +280,22 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
         (tree->parameter_count != 0u && tree->parameters == NULL)) {
         return CANOPY_ERROR_ARGUMENT;
     }
+    /*@ loop invariant 0 <= index <= tree->node_count;
+        loop invariant \forall integer node; 0 <= node < index ==> canopy_node_is(tree, node);
+        loop invariant canopy_linked_to(tree->nodes, tree->node_count, index);
+        loop invariant canopy_nested(tree->nodes, index);
+        loop invariant words_end <= tree->word_count;
+        loop invariant \forall integer node; 0 <= node < index && canopy_type_words(tree->nodes[node].type) > 0 ==>
+                       canopy_words_end(&tree->nodes[node]) <= words_end;
+        loop invariant canopy_words_apart(tree->nodes, index);
+        loop assigns index, words_end;
+        loop variant tree->node_count - index;
+    */
     for (uint16_t index = 0; index < tree->node_count; index++) {
         const canopy_node_t *node = &tree->nodes[index];
 
+        //@ assert index > 0 ==> canopy_linked(tree->nodes, tree->node_count, index - 1);
+        //@ assert index > 0 ==> canopy_hangs(tree->nodes, tree->node_count, index);
         /* Only the root's place is looked at here: every later node is a child of one that children_fit() accepted. */
         if ((index == 0u && (node->parent != 0u || node->end != tree->node_count)) ||
             node->type >= (uint8_t)CANOPY_NODE_TYPES || !words_fit(tree, node, &words_end) ||
@@ -188,6 +306,13 @@ canopy_error_t canopy_tree_validate(const canopy_tree_t *tree, uint16_t *bad_nod
             }
             return CANOPY_ERROR_TREE;
         }
+        //@ assert index > 0 ==> canopy_linked(tree->nodes, tree->node_count, tree->nodes[index].parent);
+        //@ assert canopy_linked(tree->nodes, tree->node_count, index);
+        //@ assert index > 0 ==> canopy_below(tree->nodes, index - 1);
+        //@ assert index > 0 ==> canopy_under(tree->nodes, index);
+        //@ assert index > 0 ==> canopy_below(tree->nodes, tree->nodes[index].parent);
+        //@ assert canopy_below(tree->nodes, index);
     }
+    //@ assert canopy_form_is(tree->nodes, tree->node_count);
     return CANOPY_OK;
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs Frama-C: EVA on the engine, the validator, the loop, the codecs and the rings, WP on the rings' contracts.
+"""Runs Frama-C: EVA on the engine, the validator, the loop and the codecs, WP on the rings' and validator's contracts.
 
 usage: run.py [--jobs N] [--only WORD] [--all]
 
@@ -22,6 +22,7 @@ from pathlib import Path
 
 HERE = Path("tests/proof")
 OUT = Path("build/proof")
+PLAIN = OUT / "plain"  # where EVA works: the runtime without contracts
 ENGINE = ["runtime/src/tree.c", "runtime/src/tree_validate.c"]
 CODECS = [*sorted(Path("tests/integration/dbc").glob("*.dbc")), Path("examples/nao/nao.dbc")]
 FRAMA_C = ["frama-c", "-c11", "-no-unicode", "-machdep", "gcc_x86_64"]
@@ -52,7 +53,7 @@ class Run:
         cpp = [f"-I{folder}" for folder in include] + [f"-D{define}" for define in self.defines]
         if self.wp:
             cpp = ["-nostdinc", f"-I{HERE}/include", *cpp, f"-I{share.strip()}/libc"]
-            prove = ["-wp", "-wp-rte", "-wp-model", "Typed+Cast", "-wp-prover", "z3,cvc4", "-wp-timeout", "60"]
+            prove = ["-wp", "-wp-rte", *self.options, "-wp-prover", "z3,cvc4", "-wp-timeout", "60"]
             return [*FRAMA_C, "-no-frama-c-stdlib", f"-cpp-extra-args={' '.join(cpp)}", *prove, *self.sources]
         show = ["-eva", "-eva-no-show-progress"]
         return [*FRAMA_C, f"-cpp-extra-args={' '.join(cpp)}", *show, *self.options, *self.sources]
@@ -100,7 +101,14 @@ def all_runs(every_inner: bool) -> list[Run]:
     loop = [f"runtime/src/{part}.c" for part in ("tree", "bus", "loop", "trace", "e2e")]
     generated = [str(path) for path in sorted(application.glob("*.c"))]
     runs += [
-        Run("wp ring, time", [f"{HERE}/wp_arithmetic.c", "runtime/src/ring.c"], [], wp=True),
+        Run("wp ring, time", [f"{HERE}/wp_arithmetic.c", "runtime/src/ring.c"], ["-wp-model", "Typed+Cast"], wp=True),
+        # What the shapes are is proved by itself: 38 lines of values would be in the way of each of the other goals.
+        Run("wp validator", [f"{HERE}/wp_validate.c"],
+            ["-wp-no-init-const", "-wp-skip-fct",
+             "shapes_of_nodes_def,canopy_time_reached,canopy_tree_status,canopy_tree_status_code"], wp=True),
+        Run("wp shapes", [f"{HERE}/wp_validate.c"], ["-wp-fct", "shapes_of_nodes_def"], wp=True),
+        Run("wp walks", [f"{HERE}/wp_walks.c"],
+            ["-wp-fct", "canopy_count_children,canopy_parallel_open_child,canopy_try_catch_handler"], wp=True),
         Run("loop, bus, trace", [f"{HERE}/eva_loop.c", *loop, *generated, "examples/nao/home_leaves.c"], LOOP,
             include=[str(application)]),
         Run("e2e, time", [f"{HERE}/eva_e2e.c", "runtime/src/e2e.c"],
@@ -112,6 +120,18 @@ def all_runs(every_inner: bool) -> list[Run]:
             ["-eva-slevel", "100", "-warn-special-float", "none"], include=[str(OUT)], everything=True)
         for dbc in CODECS
     ]  # fmt: skip
+
+
+def leave_out_contracts() -> None:
+    """EVA would give an alarm for each contract that it cannot prove, and rely on it: it gets none of them."""
+    for path in sorted(Path("runtime").rglob("*.*")):
+        (PLAIN / path).parent.mkdir(parents=True, exist_ok=True)
+        text = path.read_text(encoding="utf-8")
+        text = re.sub(r"/\*@.*?\*/|//@[^\n]*", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
+        (PLAIN / path).write_text(text, encoding="utf-8")
+    for folder in ("tests", "examples", "build"):
+        if not (PLAIN / folder).is_symlink():
+            (PLAIN / folder).symlink_to(Path(folder).resolve())
 
 
 def listed_alarms() -> dict[str, set[str]]:
@@ -132,9 +152,7 @@ def listed_alarms() -> dict[str, set[str]]:
 def found_alarms(log: str) -> set[str]:
     """`file: assertion` of each; a line's number would change with every edit above it."""
     found = re.findall(r"^\[eva:alarm\] (\S+?):\d+: Warning:((?:\s+[^\[\s].*)+)", log, re.MULTILINE)
-    texts = {f"{file}: {' '.join(text.split())}" for file, text in found}
-    # The postcondition is WP's to prove; EVA does not count it as an alarm either.
-    return {text for text in texts if "function canopy_time_reached" not in text}
+    return {f"{file}: {' '.join(text.split())}" for file, text in found}
 
 
 def judge_eva(run: Run, log: str) -> tuple[str, list[str]]:
@@ -168,7 +186,9 @@ def judge_wp(log: str) -> tuple[str, list[str]]:
 def prove(run: Run) -> bool:
     """One run; True when all is proved."""
     started = time.monotonic()
-    result = subprocess.run(run.command(), capture_output=True, text=True, check=False)
+    folder = Path.cwd() if run.wp else PLAIN.resolve()
+    environment = {**os.environ, "PWD": str(folder)}  # Frama-C goes by this
+    result = subprocess.run(run.command(), cwd=folder, env=environment, capture_output=True, text=True, check=False)
     log = result.stdout + result.stderr
     (OUT / f"{re.sub('[^A-Za-z0-9]+', '_', run.name)}.log").write_text(log, encoding="utf-8")
     summary, wrong = judge_wp(log) if run.wp else judge_eva(run, log)
@@ -197,6 +217,7 @@ def main() -> int:
     OUT.mkdir(parents=True, exist_ok=True)
     os.environ["WHY3CONFIG"] = str(OUT / "why3.conf")  # not the one in the user's home
     subprocess.run(["why3", "config", "detect"], capture_output=True, check=True)
+    leave_out_contracts()
     runs = [run for run in all_runs(options.all) if options.only in run.name]
     with ThreadPoolExecutor(max_workers=options.jobs) as pool:
         results = [prove_axioms(), *pool.map(prove, runs)]

@@ -119,11 +119,19 @@ static inline uint16_t *canopy_words(canopy_tree_instance_t *self, uint16_t node
 }
 
 /** How many children; O(children). */
+/*@ requires canopy_instance_is_sound(self) && node < self->tree->node_count;
+    assigns \nothing;
+    ensures \result < self->tree->nodes[node].end - node;
+*/
 static inline uint16_t canopy_count_children(const canopy_tree_instance_t *self, uint16_t node)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t children = 0;
 
+    /*@ loop invariant canopy_walks(self->tree, node, child) && children < child - node;
+        loop assigns child, children;
+        loop variant nodes[node].end - child;
+    */
     for (uint16_t child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
         children++;
     }

@@ -20,10 +20,19 @@ enum {
 };
 
 /** The first child from `child` on that has not completed, or the node's end. */
+/*@ requires canopy_instance_is_sound(self) && node < self->tree->node_count;
+    requires canopy_is_child_or_end(self->tree->nodes, node, child);
+    assigns \nothing;
+    ensures canopy_is_child_or_end(self->tree->nodes, node, \result) && child <= \result;
+*/
 static inline uint16_t canopy_parallel_open_child(const canopy_tree_instance_t *self, uint16_t node, uint16_t child)
 {
     const canopy_node_t *nodes = self->tree->nodes;
 
+    /*@ loop invariant canopy_walks(self->tree, node, child) && \at(child, Pre) <= child;
+        loop assigns child;
+        loop variant nodes[node].end - child;
+    */
     while (child != nodes[node].end &&
            (self->status[child] == (uint8_t)CANOPY_SUCCESS || self->status[child] == (uint8_t)CANOPY_FAILURE)) {
         child = nodes[child].end;

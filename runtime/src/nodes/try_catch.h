@@ -18,11 +18,22 @@ static inline canopy_step_t canopy_try_catch_enter(canopy_tree_instance_t *self,
 }
 
 /** The last child. O(children). */
+/*@ requires canopy_instance_is_sound(self) && node < self->tree->node_count;
+    requires self->tree->nodes[node].type == CANOPY_NODE_TRY_CATCH;
+    assigns \nothing;
+    ensures canopy_is_child(self->tree->nodes, node, \result);
+    ensures self->tree->nodes[\result].end == self->tree->nodes[node].end;
+*/
 static inline uint16_t canopy_try_catch_handler(const canopy_tree_instance_t *self, uint16_t node)
 {
     const canopy_node_t *nodes = self->tree->nodes;
     uint16_t child = (uint16_t)(node + 1u);
 
+    //@ assert canopy_node_is(self->tree, node);
+    /*@ loop invariant canopy_walks(self->tree, node, child) && child < nodes[node].end;
+        loop assigns child;
+        loop variant nodes[node].end - child;
+    */
     while (nodes[child].end != nodes[node].end) {
         child = nodes[child].end;
     }
