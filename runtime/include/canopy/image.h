@@ -161,7 +161,7 @@ canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *l
 /** The same with the firmware's own tree; that is always there. */
 canopy_error_t canopy_image_run_own(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now);
 
-/** The hash of the image that runs, as `canopy image show` prints it; 0 while the firmware's own tree runs. */
+/** The hash of the image that runs, as `canopy image show` prints it; 0 while the firmware's own tree runs. O(1). */
 uint64_t canopy_image_running(const canopy_image_app_t *self);
 
 /** For the generated code: fills in a use's ports as the image that runs connects them. O(ports). */
