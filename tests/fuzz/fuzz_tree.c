@@ -245,6 +245,63 @@ static void expect_same_view(void)
     }
 }
 
+static bool is_child(uint16_t node, uint16_t child)
+{
+    const canopy_node_t *nodes = instance->tree->nodes;
+
+    return child > node && child < nodes[node].end && nodes[child].parent == node;
+}
+
+/** What the state words of a node may hold between two ticks. */
+static void expect_good_words(uint16_t node, const canopy_node_t *row)
+{
+    const uint16_t *words = &instance->words[row->state];
+    bool is_running = canopy_tree_status(instance, node) == CANOPY_RUNNING;
+
+    switch (row->type) {
+    case CANOPY_NODE_SEQUENCE:
+    case CANOPY_NODE_FALLBACK:
+    case CANOPY_NODE_IF_THEN_ELSE:
+    case CANOPY_NODE_TRY_CATCH:
+    case CANOPY_NODE_SWITCH:
+        EXPECT(!is_running || is_child(node, words[0]));
+        EXPECT(!is_running || canopy_tree_status(instance, words[0]) == CANOPY_RUNNING);
+        break;
+    case CANOPY_NODE_ASYNC_SEQUENCE:
+    case CANOPY_NODE_ASYNC_FALLBACK:
+        EXPECT(!is_running || is_child(node, words[0]));
+        break;
+    case CANOPY_NODE_SEQUENCE_WITH_MEMORY:
+        EXPECT(words[0] == 0u || is_child(node, words[0]));
+        break;
+    case CANOPY_NODE_PARALLEL:
+        EXPECT(!is_running || words[3] == canopy_count_children(instance, node));
+        EXPECT(!is_running || words[0] + words[1] + words[2] <= words[3]);
+        break;
+    default:
+        break;
+    }
+}
+
+/** What the next tick builds on: between two ticks it holds for every node. */
+static void expect_good_state(void)
+{
+    for (uint16_t node = 0; node < instance->tree->node_count; node++) {
+        const canopy_node_t *row = &instance->tree->nodes[node];
+        canopy_status_t parent = canopy_tree_status(instance, row->parent);
+
+        /* A node that is not RUNNING has reset its children, so below it nothing is RUNNING. */
+        EXPECT(node == 0u || parent == CANOPY_RUNNING || canopy_tree_status(instance, node) == CANOPY_IDLE);
+        /* These two have ticked all their children, and take their statuses for an index. */
+        if (node != 0u && parent == CANOPY_RUNNING &&
+            (instance->tree->nodes[row->parent].type == CANOPY_NODE_PARALLEL_ALL ||
+             instance->tree->nodes[row->parent].type == CANOPY_NODE_REACTIVE_PARALLEL)) {
+            EXPECT(canopy_tree_status_code(instance, node) <= (uint8_t)CANOPY_SKIPPED);
+        }
+        expect_good_words(node, row);
+    }
+}
+
 /** In a damaged or raw table two leaves may have one number; then the leaves cannot tell who was ticked. */
 static bool numbers_are_own(const canopy_tree_t *tree)
 {
@@ -305,6 +362,7 @@ static void run(tables_t *tables)
             }
         }
         expect_same_view();
+        expect_good_state();
         now += what % 8u == 0u ? take32(&input) : what * UINT64_C(100);
     }
     EXPECT(status[count] == GUARD && words[tables->tree.word_count] == GUARD);
