@@ -38,6 +38,8 @@ PERIOD = 0.05
 """Of the controller's tick [s]."""
 SLACK = 0.25
 """For a busy machine [s]."""
+ATTEMPTS = 4
+"""Of a run that is judged by an observer which must not miss a frame."""
 
 
 class ControllerProcess:
@@ -103,25 +105,44 @@ class Observer:
     def poll(self, timeout: float) -> bool:
         """Takes one frame; False when none came in time."""
         frame = self.bus.recv(timeout)
-        if frame is None:
-            return False
+        if frame is not None:
+            self.take(frame)
+        return frame is not None
+
+    def take(self, frame: can.Message) -> None:
+        """Decodes a frame."""
         if not frame.is_remote_frame:
             self.views.extend(self.trace.feed(frame.arbitration_id, bytes(frame.data)))
         try:
             message = self.database.get_message_by_frame_id(frame.arbitration_id)
         except KeyError:
-            return True
+            return
         if len(frame.data) != message.length:
-            return True
+            return
         self.values[message.name] = dict(message.decode_simple(bytes(frame.data)))
         if message.name in self.modes:
             self.modes[message.name].append(str(self.values[message.name]["Mode"]))
-        return True
 
-    def drain(self, quiet: float = 0.5) -> None:
-        """Takes frames until none has come for a while."""
-        while self.poll(quiet):
-            pass
+    def take_all(self, ended: Callable[[], bool], stall: float) -> None:
+        """Takes every frame until `ended`, as fast as they come, and decodes them only then.
+
+        In lock-step two processes send as fast as they can. A loaded machine may be slow, but must not stand still.
+
+        Raises:
+            AssertionError: no frame within `stall` seconds.
+        """
+        frames: list[can.Message] = []
+        last = time.monotonic()
+        while not ended():
+            frame = self.bus.recv(0.1)
+            if frame is not None:
+                frames.append(frame)
+                last = time.monotonic()
+            assert time.monotonic() - last < stall, f"no frame for {stall} s after {len(frames)}"
+        while (frame := self.bus.recv(0.5)) is not None:
+            frames.append(frame)
+        for frame in frames:
+            self.take(frame)
 
     def wait_for(self, condition: Callable[[], bool], timeout: float) -> float:
         """Listens until the condition holds; gives the seconds it took.
@@ -171,15 +192,18 @@ def lock_step_has_the_papers_ticks(build_dir: Path, bus: str, name: str) -> Obse
         ticks = sum(length for _, length in expected)
     modes = [(paper.MODES[phase], length) for phase, length in expected]
     options = ["--lock-step", "--no-lcm", "--steps", str(ticks), *start]
-    with (
-        Observer(build_dir, name, bus) as observer,
-        Simulator(bus, *options) as simulator,
-        ControllerProcess(build_dir, name, bus, "--lock-step", "--ticks", str(ticks)) as controller,
-    ):
-        observer.wait_for_ticks(ticks - 1, stall=60)
-        report = controller.wait()
-        summary = simulator.wait()
-        observer.drain()
+    for _ in range(ATTEMPTS):
+        with (
+            Observer(build_dir, name, bus) as observer,
+            Simulator(bus, *options) as simulator,
+            ControllerProcess(build_dir, name, bus, "--lock-step", "--ticks", str(ticks)) as controller,
+        ):
+            observer.take_all(lambda: controller.process.poll() is not None, stall=60)
+            report = controller.wait()
+            summary = simulator.wait()
+        # On a machine so busy that the observer stood still for 100 ms it has not seen everything: then once more.
+        if observer.trace.lost == 0 and len(observer.modes[message]) == ticks + 1:
+            break
     assert report["ticks"] == ticks
     assert report["refused"] == report["unknown"] == report["lost"] == report["dropped"] == report["timeouts"] == 0
     # When it ends, the controller sends its safe commands once more.

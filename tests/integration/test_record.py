@@ -25,8 +25,6 @@ from integration import logs, missions
 from integration.sim_peers import Simulator
 from integration.trace_source import TraceSource, to_message, write_model
 
-ATTEMPTS = 4
-
 
 class Record:
     """The process canopy record; on the bus once the context has begun."""
@@ -130,7 +128,7 @@ def run_mission(build_dir: Path, bus: str, name: str, output: Path) -> tuple[dic
 @pytest.mark.parametrize("name", ["nao_home", "nao_power"])
 @pytest.mark.timeout(600)
 def test_a_recorded_mission_is_replayed(build_dir: Path, bus: str, name: str, tmp_path: Path) -> None:
-    for attempt in range(ATTEMPTS):  # a machine that is too loaded for a run without losses says so, and tries again
+    for attempt in range(missions.ATTEMPTS):  # a machine too loaded for a run without losses says so, and tries again
         log = tmp_path / f"{attempt}.log"
         summary, lost, modes = run_mission(build_dir, bus, name, log)
         if not lost:
