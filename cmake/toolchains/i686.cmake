@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# 32-bit x86, Debian's cross compiler, or clang with its headers and libraries. An x86-64 kernel runs the programs; they are
-# linked statically, so that no C library of that kind need be installed where they run. The address sanitizer has to be
-# loaded before the C library, so programs with a sanitizer use the cross compiler's own.
+# 32-bit x86, Debian's cross compiler, or clang with its headers and libraries. An x86-64 kernel runs the programs. They are
+# linked statically, so that no C library of that kind need be installed where they run; but gcc's address sanitizer cannot
+# be, so programs with a sanitizer are run with the cross compiler's own C library.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR i686)
 if(NOT CMAKE_C_COMPILER)

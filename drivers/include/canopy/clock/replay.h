@@ -35,7 +35,10 @@ typedef struct {
 typedef struct {
     /** For the loop. receive() gives the frames of the tick at hand, then 0. send() writes. wait is NULL. */
     canopy_can_t can;
-    /** For the loop. now() is the time in the record. wait_until() goes to the next tick, whatever the deadline; false: none is left. */
+    /**
+     * For the loop. now() is the time in the record. wait_until() goes to the next tick, whatever the deadline; false:
+     * none is left.
+     */
     canopy_clock_t clock;
     canopy_replay_io_t io;
     canopy_trace_id_t inputs;
