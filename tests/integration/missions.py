@@ -29,6 +29,7 @@ from canopy.model import load_model
 from canopy.trace import Status, TraceDecoder, TreeView
 from integration import paper
 from integration.lcm_netns import LcmNetwork
+from integration.processes import OwnedProcess
 from integration.sim_peers import DBC, Simulator
 
 LCM_PEER = Path(__file__).parent / "lcm_peer.py"
@@ -42,7 +43,7 @@ ATTEMPTS = 4
 """Of a run that is judged by an observer which must not miss a frame."""
 
 
-class ControllerProcess:
+class ControllerProcess(OwnedProcess):
     """nao_home or nao_power; ends with the context."""
 
     def __init__(self, build_dir: Path, name: str, bus: str, *options: str, enter: Iterable[str] = ()) -> None:
@@ -64,16 +65,6 @@ class ControllerProcess:
         """Ends it as Ctrl-C does."""
         self.process.send_signal(signal.SIGINT)
         return self.wait()
-
-    def __enter__(self) -> ControllerProcess:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
 
 
 class Observer:

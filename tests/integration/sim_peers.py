@@ -18,11 +18,12 @@ from cantools.database.can import Database
 from e2e.p11 import e2e_p11_check, e2e_p11_protect
 
 from canopy.canbus import open_bus
+from integration.processes import OwnedProcess
 
 DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
 
 
-class Simulator:
+class Simulator(OwnedProcess):
     """The process canopy-sim; ends with the context."""
 
     def __init__(self, bus: str, *options: str, enter: list[str] | None = None) -> None:
@@ -44,16 +45,6 @@ class Simulator:
         """Ends it with a signal; gives the summary."""
         self.process.send_signal(number)
         return self.wait()
-
-    def __enter__(self) -> Simulator:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
 
 
 class Controller:

@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import can
@@ -22,11 +21,12 @@ from canopy.canbus import open_bus
 from canopy.cli import main
 from canopy.trace import Health, Status
 from integration import logs, missions
+from integration.processes import OwnedProcess
 from integration.sim_peers import Simulator
 from integration.trace_source import TraceSource, to_message, write_model
 
 
-class Record:
+class Record(OwnedProcess):
     """The process canopy record; on the bus once the context has begun."""
 
     def __init__(self, bus: str, output: Path, *options: str) -> None:
@@ -47,13 +47,6 @@ class Record:
         self.said = self.process.stderr.readline()
         assert "(Ctrl-C ends)" in self.said, self.said
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
 
 
 @pytest.fixture
