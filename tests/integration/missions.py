@@ -7,7 +7,6 @@ test_missions.py runs them on a unixbus, rig/test_missions_vcan.py on vcan0.
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import socket
@@ -15,6 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from fractions import Fraction
 from itertools import groupby
 from pathlib import Path
@@ -85,8 +85,9 @@ class Observer:
         self.trace = TraceDecoder(model)
         self.bus = open_bus(bus)
         if isinstance(self.bus, SocketcanBus):  # a burst that overruns the kernel's default is no loss of ours
-            option = SO_RCVBUFFORCE if os.geteuid() == 0 else socket.SO_RCVBUF
-            self.bus.socket.setsockopt(socket.SOL_SOCKET, option, RECEIVE_BUFFER)
+            self.bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            with suppress(PermissionError):
+                self.bus.socket.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
         self.values: dict[str, dict[str, Any]] = {}
         """Last values by message."""
         self.modes: dict[str, list[str]] = {"PowerCommand": [], "PostureCommand": []}
