@@ -23,7 +23,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "Usage: %s BUS, for example socketcan:can0 or unixbus:bus0\n", courier_app.name);
         return EXIT_USAGE;
     }
-    if (canopy_can_open(&port, argv[1], NULL, message, sizeof message) != CANOPY_OK) {
+    if (canopy_can_open(&port, argv[1], courier_app.acceptance, message, sizeof message) != CANOPY_OK) {
         fprintf(stderr, "%s: %s\n", courier_app.name, message);
         return EXIT_FAILURE;
     }

@@ -145,7 +145,10 @@ static bool after_cycle(void *context, canopy_status_t root)
 static void print_summary(const canopy_can_t *can)
 {
     const canopy_bus_counters_t *bus = &CANOPY_APP.bus_state->counters;
+    canopy_tx_counters_t tx;
     canopy_can_stats_t driver;
+
+    canopy_tx_count(CANOPY_APP.tx, &tx);
 
     can->stats(can->context, &driver);
     if (options.replay != NULL) { /* its clock measures nothing */
@@ -156,14 +159,17 @@ static void print_summary(const canopy_can_t *can)
                CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
     }
     printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32 "; sent %" PRIu32
-           ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
-           CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, bus->sent,
-           bus->tx_dropped, bus->timeouts, CANOPY_APP.tree_instance->faults);
+           ", replaced %" PRIu32 ", expired %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
+           CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, tx.sent,
+           tx.replaced, tx.expired, bus->timeouts, CANOPY_APP.tree_instance->faults);
 }
 
 /** A bus with the clock that goes with it, as the options say. @return false: the message says why. */
 static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
 {
+    static const uint32_t step = SIMULATION_STEP_ID;
+    static canopy_can_acceptance_t with_step = {.ids = &step, .count = 1};
+    const canopy_can_acceptance_t *acceptance = CANOPY_APP.acceptance;
     const atomic_bool *stop = NULL;
 
     if (options.replay != NULL) {
@@ -172,7 +178,11 @@ static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
         return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace->inputs, message, size) ==
                CANOPY_OK;
     }
-    if (canopy_can_open(&port, options.can, NULL, message, size) != CANOPY_OK) {
+    if (options.lock_step) {
+        with_step.next = acceptance;
+        acceptance = &with_step;
+    }
+    if (canopy_can_open(&port, options.can, acceptance, message, size) != CANOPY_OK) {
         return false;
     }
     if (canopy_posix_stop_on_signals(&stop) != CANOPY_OK) {

@@ -18,6 +18,7 @@ CATEGORIES = ("control", "decorator", "condition", "action")
 TRACE_MESSAGES = (
     "CanopyTick",
     "CanopyInputs",
+    "CanopyArrivals",
     "CanopyChange",
     "CanopySnapshot",
     "CanopyHealth",

@@ -3,7 +3,7 @@
  * @file
  * The drivers' common filter, and which frames can exist on a CAN bus.
  */
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 
 #include "unity.h"
 

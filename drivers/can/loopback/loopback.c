@@ -48,7 +48,7 @@ static int loopback_receive(void *context, canopy_can_frame_t *frame)
     return result;
 }
 
-static int loopback_send(void *context, const canopy_can_frame_t *frame)
+static int loopback_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     canopy_loopback_endpoint_t *self = context;
     if (self->bus == NULL || !canopy_can_frame_can_be_sent(frame)) {
@@ -56,7 +56,7 @@ static int loopback_send(void *context, const canopy_can_frame_t *frame)
         return self->bus == NULL ? CANOPY_ERROR_BUS_DOWN : CANOPY_ERROR_ARGUMENT;
     }
     const canopy_can_t *controller = self->bus->controller;
-    const int result = controller != NULL ? controller->send(controller->context, frame) : 1;
+    const int result = controller != NULL ? controller->send(controller->context, mailbox, frame) : 1;
     if (result != 1) {
         self->tx_dropped++;
         return result;

@@ -150,8 +150,9 @@ static int write_frame(const canopy_socketcan_t *self, const canopy_can_frame_t 
     return written == (ssize_t)size ? 1 : CANOPY_ERROR_IO;
 }
 
-static int socketcan_send(void *context, const canopy_can_frame_t *frame)
+static int socketcan_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
+    (void)mailbox;
     canopy_socketcan_t *self = context;
     const int result = write_frame(self, frame);
     if (result == 1) {
@@ -198,15 +199,21 @@ static bool set_option(int descriptor, int level, int name, const void *value, s
 static bool set_filters(int descriptor, const canopy_can_acceptance_t *acceptance)
 {
     struct can_filter filters[CANOPY_CAN_ACCEPT_MAX];
-    if (acceptance == NULL || acceptance->count == 0u) {
+    size_t count = 0;
+
+    if (canopy_can_accepts_everything(acceptance)) {
         return true; /* the kernel's default: every data and remote frame */
     }
-    for (size_t i = 0; i < acceptance->count; i++) {
-        const bool extended = (acceptance->ids[i] & CANOPY_CAN_ACCEPT_EXTENDED) != 0u;
-        filters[i].can_id = acceptance->ids[i];
-        filters[i].can_mask = CAN_EFF_FLAG | (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+    for (const canopy_can_acceptance_t *list = acceptance; list != NULL; list = list->next) {
+        for (uint16_t index = 0; index < list->count; index++) {
+            const bool extended = (list->ids[index] & CANOPY_CAN_ACCEPT_EXTENDED) != 0u;
+
+            filters[count].can_id = list->ids[index];
+            filters[count].can_mask = CAN_EFF_FLAG | (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+            count++;
+        }
     }
-    return set_option(descriptor, SOL_CAN_RAW, CAN_RAW_FILTER, filters, acceptance->count * sizeof filters[0]);
+    return set_option(descriptor, SOL_CAN_RAW, CAN_RAW_FILTER, filters, count * sizeof filters[0]);
 }
 
 /** Options that must be set before the socket is bound, so that no frame comes unfiltered or without its data. */

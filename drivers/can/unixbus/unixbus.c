@@ -37,6 +37,7 @@ static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_
         atomic_fetch_add_explicit(&self->malformed, 1u, memory_order_relaxed);
         return;
     }
+    frame.time = (canopy_time_t)monotonic_us();
     if ((frame.flags & CANOPY_CAN_ERROR) != 0) {
         atomic_fetch_add_explicit(&self->error_frames, 1u, memory_order_relaxed);
     }
@@ -144,8 +145,9 @@ static delivery_t deliver(canopy_unixbus_t *self, canopy_unixbus_peer_t *peer, c
     return errno == ENOENT || errno == EPIPE ? GONE : LOST;
 }
 
-static int unixbus_send(void *context, const canopy_can_frame_t *frame)
+static int unixbus_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
+    (void)mailbox;
     canopy_unixbus_t *self = context;
     uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX];
     uint32_t taken = 0;

@@ -13,14 +13,15 @@ static int lockstep_receive(void *context, canopy_can_frame_t *frame)
     if (!canopy_ring_pop(&self->queue, frame)) {
         return 0;
     }
+    frame->time = self->now;
     self->received++;
     return 1;
 }
 
-static int lockstep_send(void *context, const canopy_can_frame_t *frame)
+static int lockstep_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     const canopy_lockstep_t *self = context;
-    return self->inner->send(self->inner->context, frame);
+    return self->inner->send(self->inner->context, mailbox, frame);
 }
 
 static void lockstep_stats(void *context, canopy_can_stats_t *stats)

@@ -47,9 +47,10 @@ static int replay_receive(void *context, canopy_can_frame_t *frame)
     return 1;
 }
 
-static int replay_send(void *context, const canopy_can_frame_t *frame)
+static int replay_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     canopy_replay_t *self = context;
+    (void)mailbox;
     int result = self->io.write != NULL ? self->io.write(self->io.context, frame) : 1;
 
     if (result < 0) {

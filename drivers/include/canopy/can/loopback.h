@@ -19,7 +19,7 @@
 #define CANOPY_CAN_LOOPBACK_H
 
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 #include "canopy/ring.h"
 #include "canopy/status.h"
 

@@ -15,7 +15,7 @@
 #include <stddef.h>
 
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 #include "canopy/can/socketcan.h"
 #include "canopy/can/unixbus.h"
 #include "canopy/status.h"

@@ -21,7 +21,7 @@
 #include <stdint.h>
 
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 #include "canopy/status.h"
 
 /** The driver's object. Owned by the caller, stays where it is while open. */

@@ -27,7 +27,7 @@
 #include <time.h>
 
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 #include "canopy/ring.h"
 #include "canopy/status.h"
 
