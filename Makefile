@@ -104,7 +104,7 @@ proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any inp
 	$(SETUP)/make-venv can
 	$(PYTHON) tests/proof/run.py
 
-bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
+bench: ## instructions, stack and memory of a tick, instructions of cycles, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench
 	$(SETUP)/make-venv can,lcm,test,differential,bench
 	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md

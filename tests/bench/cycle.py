@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Counts what whole cycles of the examples take: drain, decode, tick, commit, trace. On this machine and on Cortex-M4."""
+"""Counts the instructions of whole cycles of the examples, on this machine and on Cortex-M4."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,11 +88,9 @@ def _frames(application: Application) -> str:
 def generate(application: Application, folder: Path) -> Path:
     """The application in C, and frames.c; returns the folder with all that."""
     out = folder / application.name
-    build.run(
-        *(*image.CANOPY, "compile", application.folder / "trees" / application.tree),
-        *("--dbc", application.folder / application.dbc, "--node", "Controller", "--period-ms", "50"),
-        *("--name", application.name, *application.options, "-o", out),
-    )
+    tree, dbc = application.folder / "trees" / application.tree, application.folder / application.dbc
+    options = ("--node", "Controller", "--period-ms", "50", "--name", application.name, *application.options)
+    build.run(*image.CANOPY, "compile", tree, "--dbc", dbc, *options, "-o", out)
     (out / "frames.c").write_text(_frames(application), encoding="utf-8")
     return out
 
@@ -116,7 +114,7 @@ def host_program(target: build.Target, application: Application, generated: Path
 
 
 def measure_host(program: Path) -> dict[str, float]:
-    """Part -> its instructions a cycle, and "whole". Raises RuntimeError when a frame was lost or refused."""
+    """Part -> its instructions per cycle, and "whole". Raises RuntimeError when a frame was lost or rejected."""
     parts = {"whole": (WHOLE,), **PARTS}
     return {
         part: round(instructions.collected((program, str(CYCLES)), within=functions)[0] / CYCLES, 1)
@@ -131,10 +129,10 @@ def bare_program(target: build.Target, application: Application, generated: Path
 
 
 def measure_cortex(program: Path) -> dict[str, float]:
-    """As measure_host(), and "worst": the dearest cycle of all."""
+    """As measure_host(), and "worst": the most that a single cycle took."""
     core = cortex_m.Core(program)
     if core.call("bench_cycle_start") != 0:
-        raise RuntimeError(f"{program.name}: canopy_loop_init() refuses the application")
+        raise RuntimeError(f"{program.name}: canopy_loop_init() rejects the application")
     parts = {function: part for part, functions in PARTS.items() for function in functions}
     totals = dict.fromkeys(("whole", *PARTS), 0)
     worst = 0
@@ -146,5 +144,5 @@ def measure_cortex(program: Path) -> dict[str, float]:
             totals[part] += count
     failures = core.call("bench_cycle_failures")
     if failures != 0:
-        raise RuntimeError(f"{program.name}: {failures} frames were lost or refused, or faults counted")
+        raise RuntimeError(f"{program.name}: {failures} frames were lost or rejected, or faults counted")
     return {**{part: round(total / CYCLES, 1) for part, total in totals.items()}, "worst": worst}

@@ -15,7 +15,7 @@ TICKS = (2, 12)
 def collected(command: Sequence[str | Path], within: Sequence[str] = ()) -> tuple[int, str]:
     """Instructions of a run of a program, and what it printed. Raises RuntimeError when it fails.
 
-    `within` names functions that do not call each other: only they count, with all that they call. Without it, all does.
+    `within` names functions that do not call each other: only they count, with all that they call.
     """
     only = [f"--toggle-collect={function}" for function in within]
     valgrind = ("valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", *only)

@@ -18,7 +18,7 @@ WHAT = {
 }
 # The parts of a cycle, and what they are called.
 CYCLE = {
-    "whole": "a cycle, the mean of 100",
+    "whole": "mean of 100 cycles",
     "receive": "- check and decode",
     "begin": "- freshness, safe outputs",
     "tick": "- tick",
@@ -26,7 +26,7 @@ CYCLE = {
     "trace": "- trace",
     "rest": "- loop, clock, driver",
     "e2e": "- E2E in check and commit",
-    "worst": "the dearest of the 100",
+    "worst": "longest of them",
 }
 CYCLE_TARGETS = {"nao_power": {"cortex-m4 -O2": {"whole": 2600}}}
 TARGETS = {"sequence 100": "33", "balanced 6": "46"}
@@ -111,7 +111,7 @@ def _cycles(applications: dict[str, Any], machine: str) -> str:
         for part, what in CYCLE.items():
             cells = [_cycle_cell(name, target, counts, part) for target, counts in targets.items()]
             rows.append([f"{name}: {what}" if part in ("whole", "worst") else what, *cells])
-    return _table(["instructions of a cycle", *columns], rows)
+    return _table(["instructions per cycle", *columns], rows)
 
 
 def _images(columns: dict[str, Any]) -> str:

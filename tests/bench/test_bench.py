@@ -131,11 +131,11 @@ def test_parts_of_a_cycle_add_up(nao_power: Path, tmp_path: Path) -> None:
         assert 0.7 * counts["whole"] < parts < counts["whole"]
 
 
-def test_a_cycle_that_refuses_a_frame_is_not_measured(tmp_path: Path) -> None:
+def test_a_cycle_that_rejects_a_frame_is_not_measured(tmp_path: Path) -> None:
     own = {"PowerCommand": {"E2E_CRC": 0, "E2E_Counter": 0, "Mode": 0}}
     application = replace(cycle.APPLICATIONS[0], frames=own)
     generated = cycle.generate(application, tmp_path)
-    with pytest.raises(RuntimeError, match="100 frames were lost or refused"):
+    with pytest.raises(RuntimeError, match="100 frames were lost or rejected"):
         cycle.measure_cortex(cycle.bare_program(build.CORTEX_M4[0], application, generated, tmp_path))
     with pytest.raises(RuntimeError, match="failures"):
         cycle.measure_host(cycle.host_program(build.HOSTS[0], application, generated, tmp_path))
