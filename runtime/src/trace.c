@@ -126,8 +126,8 @@ static void send_changes(const canopy_trace_config_t *config, canopy_trace_state
     uint16_t pair[2] = {NO_NODE, NO_NODE};
     unsigned filled = 0;
 
-    for (uint16_t node = 0; node < tree->tree->node_count; node++) {
-        if (self->sent[node] == tree->status[node] || changes == 0u) {
+    for (uint16_t node = 0; node < tree->tree->node_count && changes > 0u; node++) {
+        if (self->sent[node] == tree->status[node]) {
             continue;
         }
         self->sent[node] = tree->status[node];

@@ -30,7 +30,10 @@ enum {
     CANOPY_CAN_ERROR_STATE = 1u << 5
 };
 
-/** One frame. Bytes of data past length are not defined. */
+/**
+ * One frame. Bytes of data past length are not defined, nor is any of a remote frame: a driver neither reads them nor
+ * lets them out, to the bus or into a log.
+ */
 typedef struct {
     /**
      * On the clock of the loop [us]. Of a received frame: when it arrived on the wire, as the kernel or the controller
