@@ -81,12 +81,7 @@ static void set_cycle(void *image, const canopy_cycle_t *cycle)
 
 /* The second message has the same number as the first, as an extended id. */
 static const canopy_rx_message_t rx[] = {
-    {.id = SPEED_ID,
-     .length = 3,
-     .data_id = 1,
-     .timeout = TIMEOUT_US,
-     .decode = decode_speed,
-     .set_age = speed_age},
+    {.id = SPEED_ID, .length = 3, .data_id = 1, .timeout = TIMEOUT_US, .decode = decode_speed, .set_age = speed_age},
     {.id = PLAIN_ID,
      .flags = CANOPY_CAN_EXTENDED,
      .length = 1,

@@ -137,7 +137,8 @@ static void a_flapping_controller_is_restarted_less_and_less_often(void)
         canopy_time_t pause = first_attempt_after(now);
         canopy_time_t doubled = CANOPY_CAN_RESTART_FIRST_US << time;
 
-        TEST_ASSERT_EQUAL_UINT64(doubled < CANOPY_CAN_RESTART_LONGEST_US ? doubled : CANOPY_CAN_RESTART_LONGEST_US, pause);
+        TEST_ASSERT_EQUAL_UINT64(doubled < CANOPY_CAN_RESTART_LONGEST_US ? doubled : CANOPY_CAN_RESTART_LONGEST_US,
+                                 pause);
         now += pause + 1000u;
         (void)step(CANOPY_CAN_CONTROLLER_PASSIVE, false, now);
         now += 1000u;

@@ -343,15 +343,14 @@ static void counters_stay_at_their_largest_value(void)
                                                  .change = {.id = CANOPY_TRACE_OFF},
                                                  .snapshot = {.id = CANOPY_TRACE_OFF},
                                                  .inputs = {.id = CANOPY_TRACE_OFF},
-                                               .arrivals = {.id = CANOPY_TRACE_OFF},
+                                                 .arrivals = {.id = CANOPY_TRACE_OFF},
                                                  .health = {.id = 7},
                                                  .model = {.id = CANOPY_TRACE_OFF},
                                                  .health_every = 1};
 
     app.trace = &health;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
-    bus_state.counters =
-        (canopy_bus_counters_t){.unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1};
+    bus_state.counters = (canopy_bus_counters_t){.unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1};
     transmit.replaced = UINT32_MAX;
     transmit.trace_late = 1;
     canopy_bus_receive(&bus_state, &unknown, 0);

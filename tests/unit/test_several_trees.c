@@ -45,8 +45,9 @@ static int controller_receive(void *context, canopy_can_frame_t *frame)
     if (time_now < next_wheels) {
         return 0;
     }
+    *frame = (canopy_can_frame_t){
+        .time = next_wheels, .id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     next_wheels += 10 * MS;
-    *frame = (canopy_can_frame_t){.id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     return 1;
 }
 
@@ -129,7 +130,8 @@ void setUp(void)
     }
     bus = (canopy_loopback_t){.controller = &controller};
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &driver_end, driver_queue, QUEUE, driver_app.acceptance));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, navigator_app.acceptance));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, navigator_app.acceptance));
     driver_config.after_cycle = NULL;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&driver, &driver_config));
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&navigator, &navigator_config));

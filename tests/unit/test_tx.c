@@ -402,7 +402,7 @@ static void an_error_of_the_driver_keeps_the_frame_until_its_deadline(void)
     post(PLAIN, 1, 100);
     trace(1, 100);
     canopy_tx_service(&tx, 0);
-    TEST_ASSERT_EQUAL_UINT(1, boxes.offered); /* the others would fare no better */
+    TEST_ASSERT_EQUAL_UINT(1, boxes.offered);  /* the others would fare no better */
     TEST_ASSERT_FALSE(canopy_tx_is_busy(&tx)); /* nor would it help to ask again soon */
     boxes.result = 1;
     boxes.taken_is = CANOPY_CAN_SENT;

@@ -15,8 +15,13 @@ static void encode(const void *image, uint8_t *data)
     data[0] = *(const uint8_t *)image;
 }
 
-#define MESSAGE(number) \
-    {.id = 0x100 + (number), .length = 1, .data_id = CANOPY_E2E_NONE, .every = 1, .place = 2 * (number), .encode = encode}
+#define MESSAGE(number)          \
+    {.id = 0x100 + (number),     \
+     .length = 1,                \
+     .data_id = CANOPY_E2E_NONE, \
+     .every = 1,                 \
+     .place = 2 * (number),      \
+     .encode = encode}
 static const canopy_tx_message_t messages[MESSAGES] = {MESSAGE(0), MESSAGE(1), MESSAGE(2),
                                                        MESSAGE(3), MESSAGE(4), MESSAGE(5)};
 static canopy_tx_slot_t slots[MESSAGES];
