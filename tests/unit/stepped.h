@@ -59,16 +59,19 @@ static ucontext_t explorer;
 static int running = OUTSIDE;
 static model_t model;
 
+static bool is_shared(const volatile void *address)
+{
+    for (unsigned place = 0; place < shared_count; place++) {
+        if ((uintptr_t)address - (uintptr_t)shared[place].address < shared[place].size) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void step(const volatile void *address)
 {
-    bool is_shared = false;
-
-    for (unsigned place = 0; place < shared_count; place++) {
-        uintptr_t offset = (uintptr_t)address - (uintptr_t)shared[place].address;
-
-        is_shared = is_shared || offset < shared[place].size;
-    }
-    if (is_shared && running != OUTSIDE) {
+    if (running != OUTSIDE && is_shared(address)) {
         (void)swapcontext(&threads[running].context, &explorer);
     }
 }
@@ -98,7 +101,7 @@ static void stepped_store(volatile void *address, size_t size, uint32_t value, m
     if (change_store != NULL && !change_store(running, address, value, &order)) {
         return;
     }
-    if (running == OUTSIDE || model != STORE_BUFFERS) {
+    if (running == OUTSIDE || model != STORE_BUFFERS || !is_shared(address)) {
         write_memory(&store);
         return;
     }

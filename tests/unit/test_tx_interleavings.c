@@ -163,25 +163,27 @@ static void holds_in_all_orders(model_t which, unsigned posts, unsigned services
 
 static void of_two_threads(void)
 {
-    holds_in_all_orders(IN_ORDER, 1, 1, 700);
-    holds_in_all_orders(IN_ORDER, 2, 1, 10000);
-    holds_in_all_orders(IN_ORDER, 1, 2, 5000);
+    holds_in_all_orders(IN_ORDER, 1, 1, 500);
+    holds_in_all_orders(IN_ORDER, 2, 1, 5000);
+    holds_in_all_orders(IN_ORDER, 3, 1, 30000);
+    holds_in_all_orders(IN_ORDER, 1, 2, 2000);
     keep_frames_in_the_mailbox();
-    holds_in_all_orders(IN_ORDER, 1, 1, 700);
-    holds_in_all_orders(IN_ORDER, 2, 1, 10000);
-    holds_in_all_orders(IN_ORDER, 1, 2, 5000);
+    holds_in_all_orders(IN_ORDER, 1, 1, 100);
+    holds_in_all_orders(IN_ORDER, 2, 1, 1000);
+    holds_in_all_orders(IN_ORDER, 1, 2, 300);
 }
 
 static void of_two_threads_with_store_buffers(void)
 {
-    holds_in_all_orders(STORE_BUFFERS, 1, 1, 5000);
+    holds_in_all_orders(STORE_BUFFERS, 1, 1, 10000);
     keep_frames_in_the_mailbox();
-    holds_in_all_orders(STORE_BUFFERS, 1, 1, 5000);
+    holds_in_all_orders(STORE_BUFFERS, 1, 1, 1000);
+    holds_in_all_orders(STORE_BUFFERS, 1, 2, 5000);
 }
 
 static void of_a_loop_that_is_interrupted(void)
 {
-    holds_in_all_orders(INTERRUPT, 1, 1, 6);
+    holds_in_all_orders(INTERRUPT, 1, 1, 5);
     holds_in_all_orders(INTERRUPT, 3, 4, 1000);
     keep_frames_in_the_mailbox();
     holds_in_all_orders(INTERRUPT, 3, 4, 1000);
