@@ -111,18 +111,23 @@ static int prepare_echo(canopy_socketcan_t *self, uint32_t id)
 /** @return 1 the kernel has it, 0 its queue is full, negative canopy_error_t */
 static int hand_over(canopy_socketcan_t *self, const struct canfd_frame *raw, size_t size)
 {
-    ssize_t written;
+    ssize_t written = -1;
+    canopy_error_t error = CANOPY_ERROR_BUS_DOWN;
 
-    do {
-        written = send(self->socket, raw, size, MSG_DONTWAIT);
-    } while (written < 0 && errno == EINTR);
+    /* The first answer may be an old one: that the link was down a while ago, which each socket is told once. */
+    for (unsigned attempt = 0; written < 0 && error == CANOPY_ERROR_BUS_DOWN && attempt < 2u; attempt++) {
+        do {
+            written = send(self->socket, raw, size, MSG_DONTWAIT);
+        } while (written < 0 && errno == EINTR);
+        error = written < 0 ? canopy_socketcan_error(self, errno) : CANOPY_ERROR_IO;
+    }
     if (written == (ssize_t)size) {
         return 1;
     }
     if (written < 0 && (errno == ENOBUFS || errno == EAGAIN)) {
         return 0;
     }
-    return canopy_socketcan_error(self, written < 0 ? errno : EIO);
+    return error;
 }
 
 int canopy_socketcan_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)

@@ -25,7 +25,8 @@
  * State: from error frames, from the interface's flags (looked at every CANOPY_SOCKETCAN_LOOK_US) and from failed calls.
  * restart() brings a controller back from bus-off where the kernel does not (`restart-ms` 0) and the process may; and it
  * opens an interface that was removed and made anew. One that is switched off is waited for. send, receive and wait give
- * CANOPY_ERROR_BUS_DOWN, receive and wait once each time the link goes down.
+ * CANOPY_ERROR_BUS_DOWN, receive and wait at most once each time the link goes down. The count of error frames is up to date
+ * after state().
  */
 #ifndef CANOPY_CAN_SOCKETCAN_H
 #define CANOPY_CAN_SOCKETCAN_H
