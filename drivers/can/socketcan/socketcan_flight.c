@@ -84,8 +84,6 @@ void canopy_socketcan_take_echo(canopy_socketcan_t *self, const struct canfd_fra
 static void take_off(canopy_socketcan_t *self, const struct canfd_frame *raw)
 {
     self->flight.outcome = CANOPY_CAN_PENDING;
-    self->flight.must_back = false;
-    self->flight.since = canopy_socketcan_now();
     self->flight.id = raw->can_id;
     self->flight.length = raw->len;
     self->flight.flags = raw->flags;
@@ -169,14 +167,6 @@ static bool has_left_queue(const canopy_socketcan_t *self)
     return getsockopt(self->socket, SOL_SOCKET, SO_MEMINFO, info, &size) != 0 || info[SK_MEMINFO_WMEM_ALLOC] == 0u;
 }
 
-static void flush_when_blocked(canopy_socketcan_t *self)
-{
-    if (self->knowledge == CANOPY_SOCKETCAN_BY_QUEUE && self->flight.must_back && self->may_switch &&
-        canopy_socketcan_now() - self->flight.since >= CANOPY_SOCKETCAN_FLUSH_US && canopy_socketcan_switch(self)) {
-        canopy_socketcan_lose_flight(self);
-    }
-}
-
 canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox)
 {
     canopy_socketcan_t *self = context;
@@ -187,17 +177,6 @@ canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox)
         if (self->knowledge == CANOPY_SOCKETCAN_BY_QUEUE && has_left_queue(self)) {
             settle(self, CANOPY_CAN_SENT);
         }
-        if (self->flight.outcome == CANOPY_CAN_PENDING) {
-            flush_when_blocked(self);
-        }
     }
     return self->flight.outcome;
-}
-
-void canopy_socketcan_abort(void *context, uint8_t mailbox)
-{
-    canopy_socketcan_t *self = context;
-
-    (void)mailbox;
-    self->flight.must_back = true; /* outcome() does it, if it is possible, when the frame has been blocked for long */
 }

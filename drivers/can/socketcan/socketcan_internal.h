@@ -22,7 +22,6 @@ canopy_error_t canopy_socketcan_error(canopy_socketcan_t *self, int number);
 
 int canopy_socketcan_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame);
 canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox);
-void canopy_socketcan_abort(void *context, uint8_t mailbox);
 
 /** The frame that is with the kernel, if any, never leaves: the interface has dropped it. */
 void canopy_socketcan_lose_flight(canopy_socketcan_t *self);
