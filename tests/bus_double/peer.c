@@ -6,7 +6,18 @@
 
 #include "unity.h"
 
-enum { NUMBER_LOW = 2, NUMBER_HIGH = 3 };
+/** Where the number of a message of so many bytes is: behind the E2E header where there is room, else its first bytes. */
+static unsigned number_at(uint8_t length)
+{
+    return length >= 4u ? 2u : 0u;
+}
+
+uint16_t peer_number(const canopy_can_frame_t *frame)
+{
+    unsigned at = number_at(frame->length);
+
+    return (uint16_t)(frame->data[at] | ((unsigned)frame->data[at + 1u] << 8));
+}
 
 static void note_sent(peer_t *self)
 {
@@ -67,14 +78,9 @@ static void send(void *context)
         if (self->loaded[index]) {
             continue; /* it is on the wire just now */
         }
-        if (self->fill != NULL) {
-            self->fill(index, frame.data);
-        }
-        if (message->length == 8u) {
-            self->number++;
-            frame.data[NUMBER_LOW] = (uint8_t)(self->number & 0xFFu);
-            frame.data[NUMBER_HIGH] = (uint8_t)(self->number >> 8);
-        }
+        self->number = (uint16_t)(self->first_number + (self->number - self->first_number + 1u) % PEER_NUMBERS);
+        frame.data[number_at(frame.length)] = (uint8_t)(self->number & 0xFFu);
+        frame.data[number_at(frame.length) + 1u] = (uint8_t)(self->number >> 8);
         if (message->data_id != CANOPY_E2E_NONE) {
             canopy_e2e_protect((uint16_t)message->data_id, self->counter[index], frame.data, frame.length);
         }
@@ -85,9 +91,7 @@ static void send(void *context)
 
 void peer_watch(peer_t *self, const canopy_can_frame_t *frame, nanoseconds_t end)
 {
-    uint16_t number = (uint16_t)(frame->data[NUMBER_LOW] | ((unsigned)frame->data[NUMBER_HIGH] << 8));
-
-    self->on_wire_at[number % (unsigned)PEER_NUMBERS] = end;
+    self->on_wire_at[peer_number(frame) % (unsigned)PEER_NUMBERS] = end;
     self->last_on_wire = end;
 }
 
