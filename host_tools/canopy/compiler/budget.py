@@ -11,8 +11,9 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
+from canopy.compiler.bounds import Bounds, Others, make_bounds
 from canopy.compiler.bus_reader import Bus, Message
-from canopy.compiler.bus_timing import can_load_percent, trace_capacity
+from canopy.compiler.bus_timing import can_load_percent, trace_capacity, trace_frames
 from canopy.compiler.leaf_c import entry_type, item_type
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.table import Table
@@ -68,6 +69,7 @@ class Budget:
     can_load_percent: float
     bitrate: int
     kinds: tuple[KindCost, ...]
+    bounds: Bounds
 
     def as_dict(self) -> dict[str, object]:
         """For the model file."""
@@ -104,9 +106,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
     tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
     tx_trace = struct_size([u64, u32, *[u8] * 9])
     tx_mailbox = struct_size([u64, u32, u16, u8])
-    tx = struct_size(
-        [*[pointer] * 4, ring, u16, *[u8] * 5, tx_trace, array(tx_mailbox, MAILBOXES_MAX), *[u32] * 5]
-    )
+    tx = struct_size([*[pointer] * 4, ring, u16, *[u8] * 5, tx_trace, array(tx_mailbox, MAILBOXES_MAX), *[u32] * 5])
     image_in = struct_size([u64, u8, u8, *(_message_struct(m, received=True) for m in bus.receive)])
     image_out = struct_size(
         [array(u32, max(1, -(-outputs // 32))), u32, u8, *(_message_struct(m, received=False) for m in bus.send)]
@@ -187,7 +187,13 @@ def flash_bytes(table: Table, bus: Bus) -> int:
 
 
 def make_budget(
-    table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int, images: ImageCost | None = None
+    table: Table,
+    bus: Bus,
+    period_ms: int,
+    changes_max: int,
+    bitrate: int,
+    others: Others,
+    images: ImageCost | None = None,
 ) -> Budget:
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     images = images or ImageCost()
@@ -200,4 +206,5 @@ def make_budget(
         can_load_percent=can_load_percent(bus, period_ms, changes_max, bitrate),
         bitrate=bitrate,
         kinds=kind_costs(table),
+        bounds=make_bounds(bus, bitrate, others, trace_frames(bus, changes_max)),
     )

@@ -18,9 +18,10 @@ import jinja2
 from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
+from canopy.compiler.bounds import Others
 from canopy.compiler.budget import Budget, make_budget
-from canopy.compiler.bus_timing import frame_us, frames_in, trace_capacity
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
+from canopy.compiler.bus_timing import frame_us, frames_in, trace_capacity
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.image_catalogue import Catalogue
 from canopy.compiler.image_room import exchangeable, image_cost, make_room
@@ -126,6 +127,7 @@ def load_application(
     include: str | None = None,
     options: Options | None = None,
     images: tuple[int, int] | None = None,
+    others: Others | None = None,
 ) -> Application:
     """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
 
@@ -145,7 +147,7 @@ def load_application(
         table = exchangeable(table)
         catalogue = Catalogue(table, make_room(table, *images))
     cost = image_cost(table, catalogue.room) if catalogue is not None else None
-    budget = make_budget(table, bus, period_ms, changes_max, bitrate, cost)
+    budget = make_budget(table, bus, period_ms, changes_max, bitrate, others or Others(), cost)
     return Application(name, table, bus, period_ms, bitrate, budget, changes_max, options, catalogue)
 
 

@@ -30,7 +30,10 @@ enum {
     CANOPY_CAN_ERROR_STATE = 1u << 5
 };
 
-/** One frame. Bytes of data past length are not defined. */
+/**
+ * One frame. Bytes of data past length are not defined, nor is any of a remote frame: a driver neither reads them nor
+ * lets them out, to the bus or into a log.
+ */
 typedef struct {
     /**
      * On the clock of the loop [us]. Of a received frame: when it arrived on the wire, as the kernel or the controller
@@ -59,9 +62,9 @@ typedef enum {
     CANOPY_CAN_CONTROLLER_ACTIVE = 0, /**< Error-active; also of a driver that does not know. */
     CANOPY_CAN_CONTROLLER_WARNING,    /**< An error counter is at 96 or more. */
     CANOPY_CAN_CONTROLLER_PASSIVE,    /**< Error-passive: an error counter is at 128 or more. */
-    CANOPY_CAN_CONTROLLER_BUS_OFF,    /**< The transmit error counter went over 255: takes part no more until restart(). */
-    CANOPY_CAN_CONTROLLER_DOWN,       /**< Switched off, by the operating system for example. */
-    CANOPY_CAN_CONTROLLER_GONE        /**< The interface does not exist any more. */
+    CANOPY_CAN_CONTROLLER_BUS_OFF, /**< The transmit error counter went over 255: takes part no more until restart(). */
+    CANOPY_CAN_CONTROLLER_DOWN,    /**< Switched off, by the operating system for example. */
+    CANOPY_CAN_CONTROLLER_GONE     /**< The interface does not exist any more. */
 } canopy_can_controller_t;
 
 /** What has become of a frame that send() took. */
