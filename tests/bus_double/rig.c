@@ -62,12 +62,15 @@ static void watch(void *context, const canopy_can_frame_t *frame, const controll
     }
 }
 
+static const canopy_can_acceptance_t everything = {.everything = true};
+
 static void make_driver(rig_t *self, const rig_options_t *options)
 {
     controller_config_t controller = options->controller != NULL ? *options->controller : CONTROLLER_COMMON;
 
     if (options->queue != 0u) {
-        socket_init(&self->socket, &self->wire, options->queue, !options->no_echo, options->app->acceptance);
+        socket_init(&self->socket, &self->wire, options->queue, !options->no_echo,
+                    options->unfiltered ? &everything : options->app->acceptance);
         self->controller = &self->socket.controller;
         self->config.can = &self->socket.can;
         return;

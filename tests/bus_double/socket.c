@@ -135,7 +135,7 @@ void socket_init(socket_t *self, wire_t *wire, uint32_t queue_length, bool has_e
                                .wait = wait,
                                .stats = stats,
                                .mailboxes = 1,
-                               .is_filtered = true};
+                               .is_filtered = !canopy_can_accepts_everything(acceptance)};
 }
 
 void socket_set_link(socket_t *self, socket_link_t link)
