@@ -26,6 +26,9 @@ static canopy_can_frame_t make(traffic_t *self)
         .length = (uint8_t)random_between(&self->random, self->config.shortest, 8),
     };
 
+    if (self->config.mixed && random_between(&self->random, 0, 1) == 0u) {
+        frame.id = 0x700u | (frame.id & 0xFFu);
+    }
     for (unsigned byte = 0; byte < frame.length; byte++) {
         frame.data[byte] = (uint8_t)(random_next(&self->random) >> 24);
     }

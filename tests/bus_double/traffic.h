@@ -24,6 +24,7 @@ typedef struct {
     uint32_t per_second; /**< Instead of share and burst: so many frames, evenly. */
     uint32_t lowest_id;
     uint32_t highest_id; /**< 11 bits. */
+    bool mixed;          /**< Half of them have an id of 0x700 or more instead: the least urgent ones. */
     uint8_t shortest;    /**< Bytes of data; up to 8. */
 } traffic_config_t;
 
