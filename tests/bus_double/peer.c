@@ -39,7 +39,8 @@ static void take_command(peer_t *self, const canopy_can_frame_t *frame)
         const canopy_tx_message_t *message = &self->app->bus->tx[index];
         peer_command_t *command = &self->commands[index];
 
-        if (frame->id != message->id || (frame->flags & CANOPY_CAN_EXTENDED) != (message->flags & CANOPY_CAN_EXTENDED)) {
+        if (frame->id != message->id ||
+            (frame->flags & CANOPY_CAN_EXTENDED) != (message->flags & CANOPY_CAN_EXTENDED)) {
             continue;
         }
         if (message->data_id != CANOPY_E2E_NONE &&

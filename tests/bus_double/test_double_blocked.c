@@ -122,8 +122,8 @@ static void print(const char *driver)
 {
     const canopy_tx_counters_t counters = rig_counters(&rig);
 
-    printf("%-34s %-14s %5u ms: %5" PRIu32 " commands on the wire, %4" PRIu32 " old (oldest %5" PRIu32 " ms); expired %5" PRIu32
-           ", replaced %5" PRIu32 "; told after %" PRIu64 " us\n",
+    printf("%-34s %-14s %5u ms: %5" PRIu32 " commands on the wire, %4" PRIu32 " old (oldest %5" PRIu32
+           " ms); expired %5" PRIu32 ", replaced %5" PRIu32 "; told after %" PRIu64 " us\n",
            driver, kind == CABLE_OUT ? "cable out" : "others have it", length_ms, commands, old, oldest_us / 1000u,
            counters.expired, counters.replaced, told_at != 0u ? (told_at - blocked_at) / NS_PER_US : 0u);
 }
