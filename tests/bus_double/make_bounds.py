@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the compiler's bounds for a DBC at several loads by others as a C header: what is measured is compared with it.
+"""Writes the compiler's bounds for a DBC at several loads by others as a C header, with which a test compares.
 
 make_bounds.py DBC PERIOD_MS RECEIVED_MESSAGE HEADER
 """
