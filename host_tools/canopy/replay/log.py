@@ -26,7 +26,8 @@ from canopy.unixbus import encode
 _EXTENDED = 1 << 29
 _LAST_TICK = (1 << 32) - 1
 _NUMBERED = ("CanopyTick", "CanopyChange", "CanopySnapshot")
-_NEEDED = ("CanopyTick", "CanopyInputs", "CanopyArrivals")
+NEEDED = ("CanopyTick", "CanopyInputs", "CanopyArrivals")
+"""Trace messages without which nothing can be replayed."""
 AHEAD = 5
 """A command may be so many ticks ahead of its CanopyTick: a trace frame waits CANOPY_TRACE_PERIODS for the bus, 4."""
 SUFFIXES = (".log", ".asc", ".blf")
@@ -59,7 +60,7 @@ class Bus:
         """Which kind a trace message is."""
         self.protected: dict[int, int] = {}
         """The E2E data ids of protected commands."""
-        for need in _NEEDED:
+        for need in NEEDED:
             if need not in model.trace:
                 raise ModelError(
                     f"{model.path}: trace: has no {need}, without which nothing can be replayed: add it to the DBC as "
