@@ -73,7 +73,7 @@ class Health:
         return self.rx_unknown if self.rx_unknown != _FILTERED else None
 
 
-CAN_STATES = ("error-active", "warning", "error-passive", "blocked", "bus-off", "down", "gone")
+CAN_STATES = ("error-active", "error-warning", "error-passive", "blocked", "bus-off", "down", "gone")
 """The state of the bus by its number in CanopyArrivals (runtime/include/canopy/can_state.h)."""
 
 
