@@ -32,32 +32,34 @@ canopy_arrival_clocks_t canopy_arrival_clocks(int64_t before)
 void canopy_arrival_start(canopy_arrival_t *self, const canopy_arrival_clocks_t *clocks)
 {
     self->empty_at = clocks->before;
-    self->low = clocks->real - clocks->after;
-    self->high = clocks->real - clocks->before;
-    self->before = self->high;
+    self->now.low = clocks->real - clocks->after;
+    self->now.high = clocks->real - clocks->before;
+    self->before = self->now;
 }
 
 void canopy_arrival_look(canopy_arrival_t *self, const canopy_arrival_clocks_t *clocks)
 {
     int64_t low = clocks->real - clocks->after;
     int64_t high = clocks->real - clocks->before;
-    bool is_as_before = low <= self->high && high >= self->low;
+    bool is_as_before = low <= self->now.high && high >= self->now.low;
 
-    self->before = self->high;
+    self->before = self->now;
     /* While nobody sets the clock, each look says more exactly what the difference is. */
-    self->low = is_as_before && self->low > low ? self->low : low;
-    self->high = is_as_before && self->high < high ? self->high : high;
+    self->now.low = is_as_before && self->now.low > low ? self->now.low : low;
+    self->now.high = is_as_before && self->now.high < high ? self->now.high : high;
 }
 
 int64_t canopy_arrival_of(const canopy_arrival_t *self, int64_t stamp, int64_t now)
 {
-    const int64_t candidates[] = {stamp - self->high, stamp - self->before};
+    /* Each difference is known within bounds, so each candidate is a span, of which the oldest time counts. */
+    const int64_t first[] = {stamp - self->now.high, stamp - self->before.high};
+    const int64_t last[] = {stamp - self->now.low, stamp - self->before.low};
     int64_t oldest = now;
     bool found = false;
 
     for (unsigned index = 0; stamp != 0 && index < 2u; index++) {
-        if (candidates[index] >= self->empty_at && candidates[index] <= oldest) {
-            oldest = candidates[index];
+        if (last[index] >= self->empty_at && first[index] <= oldest) {
+            oldest = first[index] > self->empty_at ? first[index] : self->empty_at;
             found = true;
         }
     }

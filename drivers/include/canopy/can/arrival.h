@@ -7,7 +7,7 @@
  * the queue, so a frame was stamped with the difference of the last look or with that of the look before. And a frame that
  * is taken arrived after the last time at which the queue was found empty, and before now. Of the two possible times the
  * one within these bounds counts; of two the older; without any, the time at which the queue was empty. So a frame never
- * looks younger than it is, whatever happens to the wall clock.
+ * looks younger than it is when the wall clock is set, once between two looks, by more than such a look takes (microseconds).
  *
  * Pure but for canopy_arrival_clocks(); no state but the object. All times in ns.
  */
@@ -19,9 +19,10 @@
 /** What is known of the queue and of the clocks. */
 typedef struct {
     int64_t empty_at; /**< Monotonic: whatever is taken from now on arrived later than this. */
-    int64_t low;      /**< CLOCK_REALTIME minus CLOCK_MONOTONIC is at least this, */
-    int64_t high;     /**< and at most this. */
-    int64_t before;   /**< `high` at the look before. */
+    struct {
+        int64_t low;  /**< CLOCK_REALTIME minus CLOCK_MONOTONIC is at least this, */
+        int64_t high; /**< and at most this. */
+    } now, before;    /**< At the last look, and at the one before. */
 } canopy_arrival_t;
 
 /** Both clocks, read one after the other. */
