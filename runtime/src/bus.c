@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#define MS UINT32_C(1000) /* [us] */
+
 /** Order of the table: standard ids before extended ones. The driver's error frames are behind all: no message is one. */
 static uint32_t rank(uint32_t id, uint8_t flags)
 {
@@ -59,14 +61,15 @@ static uint16_t age_in_ms(canopy_time_t now, canopy_time_t arrived)
     if (!canopy_time_reached(now, arrived)) {
         return 0; /* it has come since the cycle began */
     }
-    return age <= UINT64_C(1000) * (CANOPY_AGE_MAX - 1u) ? (uint16_t)((age + 999u) / 1000u) : CANOPY_AGE_MAX;
+    /* In 32 bits: there is a divider for them. */
+    return age <= MS * (CANOPY_AGE_MAX - 1u) ? (uint16_t)(((uint32_t)age + MS - 1u) / MS) : CANOPY_AGE_MAX;
 }
 
 /** Notes when the values arrived that are in the input image now. What is not told in whole ms is not known. */
 static void note_arrival(canopy_rx_state_t *state, const canopy_rx_message_t *message, uint16_t age, canopy_time_t now)
 {
     state->age_ms = age;
-    state->arrived_at = now - UINT64_C(1000) * age;
+    state->arrived_at = now - MS * age;
     state->received = age < CANOPY_AGE_MAX || message->timeout == 0u;
 }
 

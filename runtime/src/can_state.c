@@ -4,12 +4,11 @@
 
 #include <stddef.h>
 
-#include "canopy/bus.h"
+#include "canopy/count.h"
 
 static canopy_can_state_t look(const canopy_can_t *can, bool blocked)
 {
-    canopy_can_controller_t controller =
-        can->state != NULL ? can->state(can->context) : CANOPY_CAN_CONTROLLER_ACTIVE;
+    canopy_can_controller_t controller = can->state != NULL ? can->state(can->context) : CANOPY_CAN_CONTROLLER_ACTIVE;
 
     switch (controller) {
     case CANOPY_CAN_CONTROLLER_BUS_OFF:

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-enum { LATENESS_FIRST_US = 16, STOP_WAIT_US = 1000, STOP_POLLS_MAX = 1000000 };
+enum { LATENESS_FIRST_US = 16, STOP_WAIT_US = 1000, STOP_POLLS_MAX = 100000 };
 
 static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t detail)
 {
@@ -20,7 +20,7 @@ static bool is_complete(const canopy_loop_config_t *config)
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
            app->trace != NULL && app->bus_state != NULL && app->input != NULL && app->output != NULL &&
            (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->trace_state != NULL &&
-           app->sent != NULL;
+           app->sent != NULL && app->rx_max > 0u && app->frame_us > 0u;
 }
 
 static void start_bus(const canopy_app_t *app)
@@ -163,10 +163,14 @@ static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
     const canopy_app_t *app = self->config->app;
     canopy_can_state_t before = self->can_manager.state;
     canopy_cycle_t cycle = {.now = now};
-    bool backlog = drain(self, now);
-    bool lasts = backlog_lasts(self, backlog);
-    bool lost = has_lost(self);
+    bool lasts;
+    bool lost;
 
+    if (canopy_tx_is_busy(app->tx)) {
+        canopy_tx_kick(app->tx, now); /* what is past its deadline must not leave while this tick is worked out */
+    }
+    lasts = backlog_lasts(self, drain(self, now));
+    lost = has_lost(self);
     cycle.overload = lasts || lost;
     cycle.can_state =
         canopy_can_manager_step(&self->can_manager, self->config->can, canopy_tx_is_blocked(app->tx), now);
@@ -263,7 +267,10 @@ static bool account_for_end(canopy_loop_t *self, canopy_time_t started, canopy_t
     return false;
 }
 
-/** Serves the transmit side until everything is out, or the time is over. @return true: everything is out. */
+/**
+ * Serves the transmit side until everything is out, the trace behind the commands too, or the time is over.
+ * @return true: every command is out.
+ */
 static bool flush(canopy_loop_t *self, canopy_time_t until)
 {
     const canopy_loop_config_t *config = self->config;
@@ -274,7 +281,8 @@ static bool flush(canopy_loop_t *self, canopy_time_t until)
     uint32_t standing = 0; /* polls in a row at which the clock did not move: some only move between cycles */
 
     canopy_tx_kick(tx, now);
-    while (!canopy_tx_is_out(tx) && !canopy_time_reached(now, until) && standing < (uint32_t)STOP_POLLS_MAX) {
+    while ((!canopy_tx_is_out(tx) || canopy_tx_is_busy(tx)) && !canopy_time_reached(now, until) &&
+           standing < (uint32_t)STOP_POLLS_MAX) {
         if (can->wait != NULL) {
             (void)can->wait(can->context, STOP_WAIT_US);
         }
@@ -325,38 +333,52 @@ static canopy_loop_t *next_of(canopy_loop_t *const *loops, uint16_t count)
     return next;
 }
 
-/** Serves those that have frames waiting for the bus, where no interrupt does. @return the shortest pause; 0: none has. */
-static canopy_time_t serve(canopy_loop_t *const *loops, uint16_t count, canopy_time_t now)
+/** Has it frames that wait for the bus, and no interrupt that sends them? */
+static bool must_be_served(const canopy_loop_t *loop)
+{
+    return loop->config->can->request == NULL && canopy_tx_is_busy(loop->config->app->tx);
+}
+
+/** How long to wait before those are served that must be: the shortest frame; 0: none must be. */
+static canopy_time_t pause_of(canopy_loop_t *const *loops, uint16_t count)
 {
     canopy_time_t pause = 0;
 
     for (uint16_t index = 0; index < count; index++) {
-        const canopy_app_t *app = loops[index]->config->app;
+        canopy_time_t frame_us = loops[index]->config->app->frame_us;
 
-        if (loops[index]->config->can->request != NULL || !canopy_tx_is_busy(app->tx)) {
-            continue;
-        }
-        canopy_tx_service(app->tx, now);
-        if (canopy_tx_is_busy(app->tx) && (pause == 0u || app->frame_us < pause)) {
-            pause = app->frame_us;
+        if (must_be_served(loops[index]) && (pause == 0u || frame_us < pause)) {
+            pause = frame_us;
         }
     }
     return pause;
+}
+
+static void serve(canopy_loop_t *const *loops, uint16_t count, canopy_time_t now)
+{
+    for (uint16_t index = 0; index < count; index++) {
+        if (must_be_served(loops[index])) {
+            canopy_tx_service(loops[index]->config->app->tx, now);
+        }
+    }
 }
 
 /** Waits for a deadline, and sends meanwhile. @return as the clock's wait_until(). */
 static bool wait_until(canopy_loop_t *const *loops, uint16_t count, canopy_time_t deadline)
 {
     const canopy_clock_t *clock = loops[0]->config->clock;
-    canopy_time_t now = clock->now(clock->context);
-    canopy_time_t pause = serve(loops, count, now);
+    canopy_time_t pause;
 
-    while (pause != 0u && !canopy_time_reached(now + pause, deadline)) {
-        if (!clock->wait_until(clock->context, now + pause)) {
+    while ((pause = pause_of(loops, count)) != 0u) {
+        canopy_time_t next = clock->now(clock->context) + pause;
+
+        if (canopy_time_reached(next, deadline)) {
+            break;
+        }
+        if (!clock->wait_until(clock->context, next)) {
             return false;
         }
-        now = clock->now(clock->context);
-        pause = serve(loops, count, now);
+        serve(loops, count, clock->now(clock->context));
     }
     return clock->wait_until(clock->context, deadline);
 }

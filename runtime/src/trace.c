@@ -24,7 +24,7 @@ typedef struct {
     canopy_time_t until;
 } sink_t;
 
-static void send(const sink_t *sink, canopy_trace_id_t id, const uint8_t data[8])
+static void send(const sink_t *sink, canopy_trace_id_t id, const canopy_tx_trace_data_t *data)
 {
     canopy_tx_trace(sink->tx, id.id, id.flags, data, sink->until);
 }
@@ -43,29 +43,29 @@ static uint32_t count_changes(const canopy_trace_state_t *self, const canopy_tre
 static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t *self, const sink_t *sink,
                       const canopy_trace_tick_t *tick, uint32_t changes)
 {
-    uint8_t data[8] = {self->sequence};
+    canopy_tx_trace_data_t data = {{self->sequence}};
 
-    put16(&data[1], tick->tick);
-    put16(&data[3], tick->tick >> 16);
-    data[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
-    data[6] = (uint8_t)changes;
-    data[7] = (uint8_t)(tick->overruns & 0xFFu);
+    put16(&data.byte[1], tick->tick);
+    put16(&data.byte[3], tick->tick >> 16);
+    data.byte[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
+    data.byte[6] = (uint8_t)changes;
+    data.byte[7] = (uint8_t)(tick->overruns & 0xFFu);
     self->sequence++;
-    send(sink, config->tick, data);
+    send(sink, config->tick, &data);
 }
 
 /** What the tick worked with. Without a sequence number: there is one after each CanopyTick. */
 static void send_inputs(const canopy_trace_config_t *config, const sink_t *sink, const canopy_trace_tick_t *tick)
 {
     canopy_time_t now = tick->cycle->now;
-    uint8_t data[8];
+    canopy_tx_trace_data_t data;
 
-    put16(&data[0], (uint32_t)(now & 0xFFFFu));
-    put16(&data[2], (uint32_t)((now >> 16) & 0xFFFFu));
-    put16(&data[4], (uint32_t)((now >> 32) & 0xFFFFu));
-    data[6] = tick->bus->taken;
-    data[7] = tick->bus->check;
-    send(sink, config->inputs, data);
+    put16(&data.byte[0], (uint32_t)(now & 0xFFFFu));
+    put16(&data.byte[2], (uint32_t)((now >> 16) & 0xFFFFu));
+    put16(&data.byte[4], (uint32_t)((now >> 32) & 0xFFFFu));
+    data.byte[6] = tick->bus->taken;
+    data.byte[7] = tick->bus->check;
+    send(sink, config->inputs, &data);
 }
 
 /**
@@ -81,29 +81,29 @@ static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_stat
                           (tick->returning ? (unsigned)RETURNING_BIT : 0u);
     bool is_due = conditions != self->conditions;
     unsigned filled = 0;
-    uint8_t data[8] = {0};
+    canopy_tx_trace_data_t data = {{0}};
 
     self->conditions = (uint8_t)conditions;
-    data[7] = (uint8_t)(tick->tick & 0xFFu);
+    data.byte[7] = (uint8_t)(tick->tick & 0xFFu);
     for (uint16_t index = 0; index < bus->bus->rx_count; index++) {
         if (!bus->rx[index].taken_then) {
             continue;
         }
         if (filled == (unsigned)ARRIVALS) {
-            data[0] = (uint8_t)(conditions | (filled << 4));
-            send(sink, config->arrivals, data);
+            data.byte[0] = (uint8_t)(conditions | (filled << 4));
+            send(sink, config->arrivals, &data);
             filled = 0;
         }
-        put16(&data[1u + 2u * filled], bus->rx[index].age_ms);
+        put16(&data.byte[1u + 2u * filled], bus->rx[index].age_ms);
         filled++;
         is_due = true;
     }
     if (is_due) {
         for (unsigned byte = 1u + 2u * filled; byte < 7u; byte++) {
-            data[byte] = 0;
+            data.byte[byte] = 0;
         }
-        data[0] = (uint8_t)(conditions | (filled << 4));
-        send(sink, config->arrivals, data);
+        data.byte[0] = (uint8_t)(conditions | (filled << 4));
+        send(sink, config->arrivals, &data);
     }
 }
 
@@ -111,15 +111,15 @@ static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_stat
 static void send_change(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                         const canopy_tree_instance_t *tree, const sink_t *sink, const uint16_t pair[2])
 {
-    uint8_t data[8] = {self->sequence};
+    canopy_tx_trace_data_t data = {{self->sequence}};
     unsigned status_b = pair[1] != (uint16_t)NO_NODE ? tree->status[pair[1]] : (unsigned)NO_STATUS;
 
-    put16(&data[1], pair[0]);
-    put16(&data[3], pair[1]);
-    data[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
-    data[6] = config->tree;
+    put16(&data.byte[1], pair[0]);
+    put16(&data.byte[3], pair[1]);
+    data.byte[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
+    data.byte[6] = config->tree;
     self->sequence++;
-    send(sink, config->change, data);
+    send(sink, config->change, &data);
 }
 
 /** The first `changes` nodes whose statuses have changed, two a frame. */
@@ -147,21 +147,23 @@ static void send_changes(const canopy_trace_config_t *config, canopy_trace_state
 static void send_snapshot(const canopy_trace_config_t *config, canopy_trace_state_t *self,
                           const canopy_tree_instance_t *tree, const sink_t *sink)
 {
-    uint8_t data[8] = {self->sequence};
     uint16_t count = tree->tree->node_count;
+    canopy_tx_trace_data_t data;
 
-    put16(&data[1], self->next_node);
-    for (unsigned place = 0; place < SNAPSHOT_NODES; place++) {
+    data.byte[0] = self->sequence;
+    put16(&data.byte[1], self->next_node);
+    for (unsigned place = 0; place < SNAPSHOT_NODES; place += 2u) {
         uint32_t node = self->next_node + place;
-        unsigned code = node < count ? tree->status[node] : (unsigned)NO_STATUS;
+        unsigned low = node < count ? tree->status[node] : (unsigned)NO_STATUS;
+        unsigned high = node + 1u < count ? tree->status[node + 1u] : (unsigned)NO_STATUS;
 
-        data[3u + (place / 2u)] |= (uint8_t)(code << (4u * (place % 2u)));
+        data.byte[3u + (place / 2u)] = (uint8_t)(low | (high << 4));
     }
     self->next_node = self->next_node + (uint32_t)SNAPSHOT_NODES < count
                           ? (uint16_t)(self->next_node + (uint16_t)SNAPSHOT_NODES)
                           : 0u;
     self->sequence++;
-    send(sink, config->snapshot, data);
+    send(sink, config->snapshot, &data);
 }
 
 static void send_health(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_instance_t *tree,
@@ -169,24 +171,24 @@ static void send_health(const canopy_trace_config_t *config, const sink_t *sink,
 {
     const canopy_bus_counters_t *counters = &tick->bus->counters;
     canopy_tx_counters_t tx;
-    uint8_t data[8];
+    canopy_tx_trace_data_t data;
 
     canopy_tx_count(sink->tx, &tx);
-    put16(&data[0], at_most16(canopy_bus_rejected(counters)));
-    put16(&data[2], tick->is_filtered ? (uint32_t)FILTERED : at_most16(counters->unknown_id));
-    put16(&data[4], at_most16(canopy_sum(canopy_sum(tx.expired, tx.replaced), tx.trace_dropped)));
-    put16(&data[6], at_most16(tree->faults));
-    send(sink, config->health, data);
+    put16(&data.byte[0], at_most16(canopy_bus_rejected(counters)));
+    put16(&data.byte[2], tick->is_filtered ? (uint32_t)FILTERED : at_most16(counters->unknown_id));
+    put16(&data.byte[4], at_most16(canopy_sum(canopy_sum(tx.expired, tx.replaced), tx.trace_dropped)));
+    put16(&data.byte[6], at_most16(tree->faults));
+    send(sink, config->health, &data);
 }
 
 static void send_model(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_t *tree)
 {
-    uint8_t data[8] = {0};
+    canopy_tx_trace_data_t data = {{0}};
 
-    put16(&data[0], tree->hash);
-    put16(&data[2], tree->hash >> 16);
-    put16(&data[4], tree->node_count);
-    send(sink, config->model, data);
+    put16(&data.byte[0], tree->hash);
+    put16(&data.byte[2], tree->hash >> 16);
+    put16(&data.byte[4], tree->node_count);
+    send(sink, config->model, &data);
 }
 
 void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,

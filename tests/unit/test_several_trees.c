@@ -46,14 +46,16 @@ static int controller_receive(void *context, canopy_can_frame_t *frame)
     if (time_now < next_wheels) {
         return 0;
     }
+    *frame = (canopy_can_frame_t){
+        .time = next_wheels, .id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     next_wheels += 10 * MS;
-    *frame = (canopy_can_frame_t){.id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     return 1;
 }
 
-static int controller_send(void *context, const canopy_can_frame_t *frame)
+static int controller_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     if (ended) {
         last_commands++;
         unsafe += frame->data[0] != 0u ? 1u : 0u;
@@ -128,8 +130,9 @@ void setUp(void)
         sent[kind].count = 0;
     }
     bus = (canopy_loopback_t){.controller = &controller};
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &driver_end, driver_queue, QUEUE, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &driver_end, driver_queue, QUEUE, driver_app.acceptance));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, navigator_app.acceptance));
     driver_config.after_cycle = NULL;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&driver, &driver_config));
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&navigator, &navigator_config));

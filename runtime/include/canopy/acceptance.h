@@ -26,10 +26,10 @@
  * a list that continues with it.
  */
 typedef struct canopy_can_acceptance {
-    const uint32_t *ids;                      /**< Lives as long as the driver is open. NULL when count is 0. */
-    uint16_t count;                           /**< 0..CANOPY_CAN_ACCEPT_MAX */
-    bool everything;                          /**< Every data and remote frame, whatever the ids: for tools that watch. */
-    bool error_frames;                        /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
+    const uint32_t *ids; /**< Lives as long as the driver is open. NULL when count is 0. */
+    uint16_t count;      /**< 0..CANOPY_CAN_ACCEPT_MAX */
+    bool everything;     /**< Every data and remote frame, whatever the ids: for tools that watch. */
+    bool error_frames;   /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
     const struct canopy_can_acceptance *next; /**< The list continues there; NULL: it ends. */
 } canopy_can_acceptance_t;
 

@@ -17,6 +17,7 @@
 #include "canopy/can.h"
 #include "canopy/can_state.h"
 #include "canopy/clock.h"
+#include "canopy/count.h"
 #include "canopy/e2e.h"
 #include "canopy/tx.h"
 
@@ -96,18 +97,6 @@ typedef struct {
     uint8_t taken; /**< How many had the id of a message, refused ones too; modulo 256. */
     uint8_t check; /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
 } canopy_bus_state_t;
-
-/** The sum, or the largest value where that is less. O(1); may be called from anywhere. */
-static inline uint32_t canopy_sum(uint32_t a, uint32_t b)
-{
-    return a <= UINT32_MAX - b ? a + b : UINT32_MAX;
-}
-
-/** Adds one, and stays at the largest value instead of starting again at 0. O(1). */
-static inline void canopy_count(uint32_t *counter)
-{
-    *counter += *counter != UINT32_MAX ? 1u : 0u;
-}
 
 /**
  * The running check of CanopyInputs after one more frame: the one before, rotated left by 3, XOR the low byte of the id,

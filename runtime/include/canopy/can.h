@@ -62,9 +62,9 @@ typedef enum {
     CANOPY_CAN_CONTROLLER_ACTIVE = 0, /**< Error-active; also of a driver that does not know. */
     CANOPY_CAN_CONTROLLER_WARNING,    /**< An error counter is at 96 or more. */
     CANOPY_CAN_CONTROLLER_PASSIVE,    /**< Error-passive: an error counter is at 128 or more. */
-    CANOPY_CAN_CONTROLLER_BUS_OFF,    /**< The transmit error counter went over 255: takes part no more until restart(). */
-    CANOPY_CAN_CONTROLLER_DOWN,       /**< Switched off, by the operating system for example. */
-    CANOPY_CAN_CONTROLLER_GONE        /**< The interface does not exist any more. */
+    CANOPY_CAN_CONTROLLER_BUS_OFF, /**< The transmit error counter went over 255: takes part no more until restart(). */
+    CANOPY_CAN_CONTROLLER_DOWN,    /**< Switched off, by the operating system for example. */
+    CANOPY_CAN_CONTROLLER_GONE     /**< The interface does not exist any more. */
 } canopy_can_controller_t;
 
 /** What a cycle worked with besides its frames. A replay tells the loop what it was. */

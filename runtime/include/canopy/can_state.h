@@ -23,11 +23,11 @@
 typedef enum {
     CANOPY_CAN_ERROR_ACTIVE = 0, /**< As it should be. */
     CANOPY_CAN_ERROR_WARNING,    /**< Many errors lately: an error counter is at 96 or more. */
-    CANOPY_CAN_ERROR_PASSIVE,    /**< So many that this controller no longer disturbs others: a counter at 128 or more. */
-    CANOPY_CAN_BLOCKED,          /**< The controller works, and nothing of what it is to send gets out in time. */
-    CANOPY_CAN_BUS_OFF,          /**< The controller has taken itself off the bus. */
-    CANOPY_CAN_DOWN,             /**< The interface is switched off. */
-    CANOPY_CAN_GONE              /**< The interface does not exist any more. */
+    CANOPY_CAN_ERROR_PASSIVE, /**< So many that this controller no longer disturbs others: a counter at 128 or more. */
+    CANOPY_CAN_BLOCKED,       /**< The controller works, and nothing of what it is to send gets out in time. */
+    CANOPY_CAN_BUS_OFF,       /**< The controller has taken itself off the bus. */
+    CANOPY_CAN_DOWN,          /**< The interface is switched off. */
+    CANOPY_CAN_GONE           /**< The interface does not exist any more. */
 } canopy_can_state_t;
 
 #define CANOPY_CAN_RESTART_FIRST_US UINT64_C(50000)     /**< From the fault to the first attempt. */
@@ -37,11 +37,11 @@ typedef enum {
 /** The state machine. All zero is the start. Members but `state` and the counters are private. */
 typedef struct {
     canopy_can_state_t state;
-    canopy_time_t since;       /* when it was last seen to work, or to fail */
-    canopy_time_t next;        /* attempt */
-    canopy_time_t pause;       /* before the attempt after that; 0: the shortest */
-    uint32_t failures;         /**< How often the bus became unusable. Saturates. */
-    uint32_t restarts;         /**< Attempts. Saturates. */
+    canopy_time_t since; /* when it was last seen to work, or to fail */
+    canopy_time_t next;  /* attempt */
+    canopy_time_t pause; /* before the attempt after that; 0: the shortest */
+    uint32_t failures;   /**< How often the bus became unusable. Saturates. */
+    uint32_t restarts;   /**< Attempts. Saturates. */
 } canopy_can_manager_t;
 
 /** True when nothing can be sent or received. O(1); may be called from anywhere. */

@@ -55,10 +55,11 @@ typedef enum {
     CANOPY_FAULT_LEAF_STATUS = 1, /**< A leaf returned no valid status; detail: its node. */
     CANOPY_FAULT_OVERRUN = 2,     /**< A cycle was not done when the next was due; detail: its length [us]. */
     CANOPY_FAULT_CAN_RECEIVE = 3, /**< The driver's receive failed; detail: minus the canopy_error_t. */
-    CANOPY_FAULT_RX_BACKLOG = 4,  /**< The second cycle in a row that left frames waiting; detail: cycles with a backlog. */
-    CANOPY_FAULT_RX_LOST = 5,     /**< The driver has lost received frames; detail: how many since the last cycle. */
-    CANOPY_FAULT_CAN_STATE = 6,   /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
-    CANOPY_FAULT_TX_EXPIRED = 7   /**< Commands were not out at their deadline; detail: how many since the last cycle. */
+    CANOPY_FAULT_RX_BACKLOG =
+        4,                    /**< The second cycle in a row that left frames waiting; detail: cycles with a backlog. */
+    CANOPY_FAULT_RX_LOST = 5, /**< The driver has lost received frames; detail: how many since the last cycle. */
+    CANOPY_FAULT_CAN_STATE = 6, /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
+    CANOPY_FAULT_TX_EXPIRED = 7 /**< Commands were not out at their deadline; detail: how many since the last cycle. */
 } canopy_fault_t;
 
 /** What the loop works with. Constant. */
@@ -88,16 +89,16 @@ typedef struct {
 /** State and accounts of a loop. Counters saturate; `ticks` alone wraps around, for it also says which messages are due. */
 typedef struct {
     const canopy_loop_config_t *config;
-    canopy_time_t deadline;      /**< When the next cycle is to start [us]. */
-    uint32_t ticks;              /**< Cycles done, modulo 2^32. */
-    uint32_t overruns;           /**< Cycles that were not done before the next was due. */
-    uint32_t slips;              /**< Cycles left out after overruns; the phase is kept. */
-    uint32_t rx_backlogs;        /**< Cycles that left frames waiting because of rx_max. */
-    uint32_t rx_errors;          /**< Failures of the driver's receive. */
-    uint32_t rx_lost;            /**< Frames that the driver has lost, as its counter says. */
-    uint32_t tx_expired;         /**< Commands that were not out at their deadline. */
-    bool backlog;                /**< The last cycle left frames waiting. */
-    bool returning;              /**< The bus was unusable: safe values go out until they are known to be out. */
+    canopy_time_t deadline; /**< When the next cycle is to start [us]. */
+    uint32_t ticks;         /**< Cycles done, modulo 2^32. */
+    uint32_t overruns;      /**< Cycles that were not done before the next was due. */
+    uint32_t slips;         /**< Cycles left out after overruns; the phase is kept. */
+    uint32_t rx_backlogs;   /**< Cycles that left frames waiting because of rx_max. */
+    uint32_t rx_errors;     /**< Failures of the driver's receive. */
+    uint32_t rx_lost;       /**< Frames that the driver has lost, as its counter says. */
+    uint32_t tx_expired;    /**< Commands that were not out at their deadline. */
+    bool backlog;           /**< The last cycle left frames waiting. */
+    bool returning;         /**< The bus was unusable: safe values go out until they are known to be out. */
     canopy_can_manager_t can_manager;
     canopy_time_t longest_cycle; /**< [us] */
     canopy_time_t most_late;     /**< Latest start of a cycle after its deadline [us]. */
@@ -108,7 +109,7 @@ typedef struct {
 
 /**
  * Sets up a loop and its application: tree IDLE, all counters 0, first deadline now.
- * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT when something needed is NULL or the period is 0. O(nodes + messages).
+ * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT when something needed is NULL, or 0. O(nodes + messages).
  */
 canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t *config);
 

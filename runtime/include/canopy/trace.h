@@ -62,7 +62,8 @@ typedef struct {
     uint32_t tick;
     canopy_status_t root;
     uint32_t overruns;
-    const canopy_cycle_t *cycle;   /**< What the tick was handed; CanopyInputs has room for a time of 2^48 us, 8.9 years. */
+    const canopy_cycle_t
+        *cycle; /**< What the tick was handed; CanopyInputs has room for a time of 2^48 us, 8.9 years. */
     const canopy_bus_state_t *bus; /**< What it has taken. */
     canopy_time_t until;           /**< When the trace frames must be out [us]. */
     bool returning;                /**< Safe values were posted instead of the tree's (canopy_loop_t.returning). */

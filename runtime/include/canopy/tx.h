@@ -34,7 +34,6 @@
 
 #include "canopy/can.h"
 #include "canopy/clock.h"
-#include "canopy/ring.h"
 #include "canopy/status.h"
 
 /** In data_id: the message has no end-to-end protection. */
@@ -45,9 +44,9 @@ typedef struct {
     uint32_t id;
     uint8_t flags;
     uint8_t length;
-    int32_t data_id;       /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
-    uint16_t every;        /**< Sent in every `every`-th tick, >= 1. */
-    uint16_t place;        /**< Where its two buffers of `length` bytes begin in canopy_tx_t.data. */
+    int32_t data_id;        /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
+    uint16_t every;         /**< Sent in every `every`-th tick, >= 1. */
+    uint16_t place;         /**< Where its two buffers of `length` bytes begin in canopy_tx_t.data. */
     canopy_time_t deadline; /**< [us] after the tick; a frame that is not out then never leaves. */
     /** Writes the output image's values into `length` bytes, all of them. */
     void (*encode)(const void *output, uint8_t *data);
@@ -55,22 +54,30 @@ typedef struct {
 
 /** Where a message waits. Private; canopy_tx_init() sets it up. */
 typedef struct {
-    canopy_time_t until[2];  /* of each buffer's frame */
-    _Atomic uint32_t latest; /* loop: version << 2 | buffer << 1 | 1 of what was posted last; 0: none, or being written */
-    _Atomic uint32_t out;    /* service: last version that is out; UINT32_MAX, which is no version: none ever was */
-    uint32_t posted;         /* loop: last version */
-    uint32_t taken;          /* service: last version that went to a mailbox, or was dropped */
+    canopy_time_t until[2]; /* of each buffer's frame */
+    _Atomic uint32_t
+        latest;           /* loop: version << 2 | buffer << 1 | 1 of what was posted last; 0: none, or being written */
+    _Atomic uint32_t out; /* service: last version that is out; UINT32_MAX, which is no version: none ever was */
+    uint32_t posted;      /* loop: last version */
+    uint32_t taken;       /* service: last version that went to a mailbox, or was dropped */
     _Atomic uint8_t reading; /* service: 1 + the buffer that it copies; 0: none */
     uint8_t counter;         /* service: E2E counter of the next frame */
     bool flying;             /* service: in a mailbox */
 } canopy_tx_slot_t;
 
+#define CANOPY_TX_TRACE_LENGTH 8u
+
+/** What a trace frame carries. */
+typedef struct {
+    uint8_t byte[CANOPY_TX_TRACE_LENGTH];
+} canopy_tx_trace_data_t;
+
 /** A trace frame that waits. Private. */
 typedef struct {
     canopy_time_t until;
     uint32_t id;
+    canopy_tx_trace_data_t data;
     uint8_t flags;
-    uint8_t data[8];
 } canopy_tx_trace_t;
 
 /** What is in a mailbox. The service's alone. Private. */
@@ -96,17 +103,22 @@ typedef struct {
 typedef struct {
     const canopy_tx_message_t *messages; /* in the order of their urgency */
     const canopy_can_t *can;
-    canopy_tx_slot_t *slots; /* `count` */
-    uint8_t *data;           /* two buffers per message */
-    canopy_ring_t trace;
+    canopy_tx_slot_t *slots;  /* `count` */
+    uint8_t *data;            /* two buffers per message */
+    canopy_tx_trace_t *trace; /* a ring of trace_mask + 1 places, which are written and read where they are */
+    uint32_t trace_mask;
     uint16_t count;
     uint8_t mailbox_count;
-    /* Written by the service only: */
-    bool trace_held;
-    bool trace_flying;
-    _Atomic bool busy;    /* a frame is in a mailbox, or waits because none took it */
-    _Atomic bool blocked; /* a frame was not out at its deadline, and nothing has got out since */
-    canopy_tx_trace_t held; /* the trace frame that is next, or in a mailbox */
+    /* The loop's: */
+    uint32_t trace_full;         /* frames that found no place */
+    _Atomic uint32_t trace_head; /* frames that ever got a place */
+    /* The service's: */
+    _Atomic uint32_t trace_tail; /* frames that ever left theirs */
+    bool trace_flying;           /* the oldest frame is in a mailbox */
+    bool watching;               /* something was handed over, and nothing has got out since */
+    _Atomic bool busy;           /* a frame is in a mailbox, or waits because none took it */
+    _Atomic bool blocked;
+    canopy_time_t watched_until; /* its deadline, of several the first */
     canopy_tx_mailbox_t mailboxes[CANOPY_CAN_MAILBOXES_MAX];
     _Atomic uint32_t sent;
     _Atomic uint32_t replaced;
@@ -140,11 +152,9 @@ canopy_error_t canopy_tx_init(canopy_tx_t *self, const canopy_tx_message_t *mess
  */
 void canopy_tx_post(canopy_tx_t *self, uint16_t message, const void *output, canopy_time_t until);
 
-/**
- * Lets a trace frame wait behind the commands. Loop's thread. One that finds no room is lost and counted. O(bytes).
- * @param data 8 bytes
- */
-void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const uint8_t data[8], canopy_time_t until);
+/** Lets a trace frame wait behind the commands. Loop's thread. One that finds no room is lost and counted. O(1). */
+void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy_tx_trace_data_t *data,
+                     canopy_time_t until);
 
 /** Sends what was posted, or lets the transmit context do it. Loop's thread, after posting, and as often as it likes. */
 void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
@@ -165,10 +175,13 @@ bool canopy_tx_is_busy(const canopy_tx_t *self);
 /** True when the last value of every message that was ever posted is known to be out. Loop's thread. O(messages). */
 bool canopy_tx_is_out(const canopy_tx_t *self);
 
-/** True while the bus lets nothing through: a frame was not out at its deadline, and none has been since. Anyone. O(1). */
+/**
+ * True while the bus lets nothing through: a frame is not out at its deadline, and nothing has got out since it was handed
+ * to the driver. One that only lost to more urgent ones does not count. Anyone. O(1).
+ */
 bool canopy_tx_is_blocked(const canopy_tx_t *self);
 
-/** Copies the counters. Loop's thread. O(1). */
+/** Copies the counters, which saturate. Loop's thread. O(1). */
 void canopy_tx_count(const canopy_tx_t *self, canopy_tx_counters_t *counters);
 
 #endif
