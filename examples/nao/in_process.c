@@ -49,8 +49,8 @@ static void put(uint8_t *data, unsigned bytes, int32_t value)
 
 static void send_sensors(nao_in_process_t *self)
 {
-    canopy_can_frame_t battery = {.id = NAO_BATTERY_ID, .length = NAO_BATTERY_LENGTH, .time = self->now};
-    canopy_can_frame_t posture = {.id = NAO_POSTURE_ID, .length = NAO_POSTURE_LENGTH, .time = self->now};
+    canopy_can_frame_t battery = {.id = NAO_BATTERY_ID, .length = NAO_BATTERY_LENGTH, .time = self->now - self->age};
+    canopy_can_frame_t posture = {.id = NAO_POSTURE_ID, .length = NAO_POSTURE_LENGTH, .time = self->now - self->age};
     const canopy_can_t *can = &self->robot_end.can;
 
     battery.data[1] = self->robot.power.charging ? CHARGING_BIT : 0;

@@ -137,6 +137,28 @@ static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
     }
 }
 
+/** What was decided for a bus that was not there must not be the first thing on it: safe values, until they are out. */
+static bool is_returning(const canopy_loop_t *self)
+{
+    return canopy_can_is_unusable(self->can_manager.state) ||
+           (self->returning && !canopy_tx_is_out(self->config->app->tx));
+}
+
+/** In a replay the bus is what it was. */
+static void take_recorded_conditions(canopy_loop_t *self, canopy_cycle_t *cycle)
+{
+    const canopy_can_t *can = self->config->can;
+    canopy_can_conditions_t conditions;
+
+    if (can->conditions != NULL) {
+        can->conditions(can->context, &conditions);
+        cycle->overload = conditions.overload;
+        cycle->can_state = (canopy_can_state_t)conditions.can_state;
+        self->can_manager.state = cycle->can_state;
+        self->returning = conditions.returning;
+    }
+}
+
 /** What this tick works with: frames, time, and the state of the bus. */
 static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
 {
@@ -154,23 +176,17 @@ static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
     cycle.overload = lasts || lost;
     cycle.can_state =
         canopy_can_manager_step(&self->can_manager, self->config->can, canopy_tx_is_blocked(app->tx), now);
+    self->returning = is_returning(self);
+    take_recorded_conditions(self, &cycle);
     account_for_bus(self, before);
     return cycle;
 }
 
-/**
- * Posts what the tree wants, or, while the bus is unusable and until it has shown otherwise, the safe values of all
- * messages: what was decided for a bus that was not there must not be the first thing on it.
- */
+/** Posts what the tree wants, or the safe values of all messages while the bus is returning. */
 static void write_outputs(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
 
-    if (canopy_can_is_unusable(self->can_manager.state)) {
-        self->returning = true;
-    } else if (self->returning && canopy_tx_is_out(app->tx)) {
-        self->returning = false;
-    }
     if (self->returning) {
         app->bus->reset_output(app->output);
         canopy_bus_commit_all(app->bus_state, app->tx, now + app->period);
@@ -189,6 +205,7 @@ static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_
                                              .overruns = self->overruns,
                                              .cycle = cycle,
                                              .bus = app->bus_state,
+                                             .returning = self->returning,
                                              .until = cycle->now + CANOPY_TRACE_PERIODS * app->period,
                                              .is_filtered = self->config->can->is_filtered});
 }

@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 enum { SNAPSHOT_NODES = 10, NO_NODE = 0xFFFF, NO_STATUS = 15, ARRIVALS = 3, FILTERED = 0xFFFF };
+enum { OVERLOAD_BIT = 8, RETURNING_BIT = 0x40 }; /* of CanopyArrivals' first byte */
 
 static void put16(uint8_t *data, uint32_t value)
 {
@@ -75,7 +76,9 @@ static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_stat
                           const canopy_trace_tick_t *tick)
 {
     const canopy_bus_state_t *bus = tick->bus;
-    unsigned conditions = (unsigned)tick->cycle->can_state | (tick->cycle->overload ? 8u : 0u);
+    unsigned conditions = (unsigned)tick->cycle->can_state |
+                          (tick->cycle->overload ? (unsigned)OVERLOAD_BIT : 0u) |
+                          (tick->returning ? (unsigned)RETURNING_BIT : 0u);
     bool is_due = conditions != self->conditions;
     unsigned filled = 0;
     canopy_tx_trace_data_t data = {{0}};

@@ -18,12 +18,13 @@ from click.testing import CliRunner, Result
 from canopy.cli import main
 from canopy.model import load_model
 from canopy.replay.inputs import Inputs
-from canopy.replay.log import LogError, Recording, Run, Taken, Tick, next_check, read_recording
+from canopy.replay.log import LogError, Recording, Run, Taken, read_recording
+from canopy.replay.ticks import Tick, next_check
 from integration import logs
 
 TICKS = 220
 BATTERY, POSTURE, POWER_COMMAND, POSTURE_COMMAND = 0x100, 0x110, 0x200, 0x210
-TICK, CHANGE, SNAPSHOT, HEALTH, INPUTS, MODEL = 0x600, 0x601, 0x602, 0x603, 0x604, 0x605
+TICK, CHANGE, SNAPSHOT, HEALTH, INPUTS, MODEL, ARRIVALS = range(0x600, 0x607)
 
 Log = list[can.Message]
 
@@ -105,7 +106,7 @@ def test_a_run_is_equal(build_dir: Path, tmp_path: Path, replay: Callable[..., R
     assert (data["equal"], data["ticks"], data["reordered"], data["differences"]) == (True, 400, 0, [])
     assert data["inputs"] == ids.count(BATTERY) + ids.count(POSTURE) - 100
     # All that it sent but the two safe commands at its end.
-    assert data["frames"] == sum(ids.count(number) for number in (0x200, 0x210, *range(TICK, MODEL + 1))) - 2
+    assert data["frames"] == sum(ids.count(number) for number in (0x200, 0x210, *range(TICK, ARRIVALS + 1))) - 2
     assert ids.count(CHANGE) > 20
     assert ids.count(HEALTH) == ids.count(MODEL) == 20
     rejected = next(m.data[0] for m in reversed(messages) if m.arbitration_id == HEALTH)
@@ -159,14 +160,12 @@ def test_several_runs(replay: Callable[..., Result], log: Log) -> None:
 
 def test_a_tick_number_that_wraps_around_is_no_start(build_dir: Path, log: Log, tmp_path: Path) -> None:
     """Tick numbers moved so that 0 comes again where the sequence number is 0, too."""
-    first = next(
-        int.from_bytes(m.data[1:5], "little") for m in log if m.arbitration_id == TICK and m.data[0] == 0 and m.data[1]
-    )
+    first, sequence = 100, log[place_of(log, TICK, 100)].data[0]
     for message in log:
+        if message.arbitration_id in (TICK, CHANGE, SNAPSHOT):
+            message.data[0] = (message.data[0] - sequence) % 256
         if message.arbitration_id == TICK:
-            data = bytearray(message.data)
-            data[1:5] = ((int.from_bytes(data[1:5], "little") - first) % 2**32).to_bytes(4, "little")
-            message.data = data
+            message.data[1:5] = ((int.from_bytes(message.data[1:5], "little") - first) % 2**32).to_bytes(4, "little")
     recording = read_recording(logs.write_log(tmp_path / "x.log", log), load_model(model_file(build_dir)))
     assert (recording.runs, recording.joined) == ([], 2**32 - first)
 
@@ -269,6 +268,7 @@ def test_no_sensor_frames_at_all(replay: Callable[..., Result], log: Log) -> Non
         (TICK, "a CanopyTick is missing"),
         (SNAPSHOT, "1 trace frames are missing, or 1 more than 256"),
         (INPUTS, "CanopyInputs of tick 150 is missing"),
+        (ARRIVALS, "CanopyArrivals of tick 150 is missing"),
     ],
 )
 def test_a_lost_trace_frame_is_a_gap(replay: Callable[..., Result], log: Log, identifier: int, text: str) -> None:
@@ -392,14 +392,18 @@ def test_a_log_of_two_buses(replay: Callable[..., Result], log: Log) -> None:
     assert replay(mixed, "--channel", "can1").exit_code == 0
 
 
-def test_a_dbc_without_the_message(build_dir: Path, tmp_path: Path, log: Log) -> None:
+@pytest.mark.parametrize("name", ["CanopyInputs", "CanopyArrivals"])
+def test_a_dbc_without_the_message(build_dir: Path, tmp_path: Path, log: Log, name: str) -> None:
     data = json.loads(model_file(build_dir).read_text())
-    del data["trace"]["CanopyInputs"]
+    del data["trace"][name]
     (tmp_path / "x.model.json").write_text(json.dumps(data))
     (tmp_path / "nao.dbc").write_bytes((model_file(build_dir).parent / "nao.dbc").read_bytes())
     path = logs.write_log(tmp_path / "run.log", log)
     command = ["replay", str(path), "--model", str(tmp_path / "x.model.json"), "--program", "x"]
-    refused(CliRunner().invoke(main, command), "trace: has no CanopyInputs, without which nothing can be replayed")
+    refused(
+        CliRunner().invoke(main, command),
+        f"trace: has no {name}, without which nothing can be replayed: add it to the DBC",
+    )
 
 
 # --- which frames a tick took, with frames of two senders -------------------------------------------------------------
@@ -409,7 +413,13 @@ def synthetic(seed: int, ticks: int = 60) -> tuple[Recording, Run, list[list[Tak
     """Frames of two senders, and ticks that took them."""
     rnd = random.Random(seed)
     received = [
-        Taken(place, rnd.choice("AB"), bytes([place % 256]), rnd.choice((None, rnd.randrange(256), rnd.randrange(256))))
+        Taken(
+            place,
+            rnd.choice((0x100, 0x110, 0x7)),
+            rnd.choice("AB"),
+            bytes([place % 256]),
+            rnd.choice((None, rnd.randrange(256), rnd.randrange(256))),
+        )
         for place in range(1, 400)
     ]
     start, run = rnd.randrange(100), Run(before=0)
@@ -423,7 +433,11 @@ def synthetic(seed: int, ticks: int = 60) -> tuple[Recording, Run, list[list[Tak
             check = next_check(check, one.fold) if one.fold is not None else check
         place += len(group)
         taken = (taken + len(group)) % 256
-        run.ticks.append(Tick(number, number, bytes(6) + bytes([taken, check])))
+        tick = Tick(number, number, conditions=rnd.randrange(16))
+        tick.ages = [rnd.randrange(65536) for _ in {one.message for one in group}]
+        check = tick.check_of_ages(check)
+        tick.inputs = bytes(6) + bytes([taken, check])
+        run.ticks.append(tick)
         groups.append(group)
     return Recording(Path("x.log"), received=received, runs=[run]), run, groups
 

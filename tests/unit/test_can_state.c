@@ -73,6 +73,12 @@ static void a_driver_that_does_not_know_is_error_active(void)
     TEST_ASSERT_EQUAL(CANOPY_CAN_BLOCKED, canopy_can_manager_step(&manager, &simple, true, 0));
 }
 
+static void a_number_that_is_no_state_is_error_active(void)
+{
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE,
+                      step((canopy_can_controller_t)(CANOPY_CAN_CONTROLLER_GONE + 1), false, 0));
+}
+
 static void a_driver_that_comes_back_by_itself_is_not_restarted(void)
 {
     canopy_can_t simple = fake_can;
@@ -173,6 +179,7 @@ int main(void)
     RUN_TEST(the_state_follows_from_what_controller_and_transmit_side_say);
     RUN_TEST(only_from_bus_off_on_is_a_bus_unusable);
     RUN_TEST(a_driver_that_does_not_know_is_error_active);
+    RUN_TEST(a_number_that_is_no_state_is_error_active);
     RUN_TEST(a_driver_that_comes_back_by_itself_is_not_restarted);
     RUN_TEST(the_pause_between_attempts_doubles_up_to_a_limit);
     RUN_TEST(once_settled_the_pause_is_the_shortest_again);

@@ -22,7 +22,8 @@ TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
     "CanopyArrivals": {
         "CanState": (0, 3),
         "Overload": (3, 1),
-        "Count": (4, 4),
+        "Count": (4, 2),
+        "Returning": (6, 1),
         "Age0": (8, 16),
         "Age1": (24, 16),
         "Age2": (40, 16),

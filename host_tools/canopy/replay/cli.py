@@ -79,9 +79,8 @@ def count_ticks(recording: Recording, run: Run, wanted: int | None) -> int:
             f"{recording.path}: has {len(run.ticks)} ticks of this run, not {wanted}: {run.gap or 'it ends there'}"
         )
     if wanted is None and run.gap is not None:
-        raise LogError(
-            f"{recording.path}: {run.gap}; a replay needs all of them; --ticks {len(run.ticks)} replays what is before"
-        )
+        way_out = f"--ticks {len(run.ticks)} replays what is before" if run.ticks else "record again"
+        raise LogError(f"{recording.path}: {run.gap}; a replay needs all of them; {way_out}")
     if not run.ticks:
         raise LogError(f"{recording.path}: has no whole tick of the controller: record for longer")
     return wanted or len(run.ticks)
@@ -115,7 +114,8 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
             f"{name}: {log} has {replayed.runs} runs of the controller; this is the first, --run chooses", err=True
         )
     if not result.differences:
-        click.echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal")
+        dropped = f"; {result.dropped} more did not leave, as CanopyHealth has counted" if result.dropped else ""
+        click.echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal{dropped}")
         return
     for difference in result.differences[:_SHOWN]:
         click.echo(f"{name}: {difference.text()}")

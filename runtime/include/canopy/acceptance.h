@@ -33,8 +33,11 @@ typedef struct canopy_can_acceptance {
     const struct canopy_can_acceptance *next; /**< The list continues there; NULL: it ends. */
 } canopy_can_acceptance_t;
 
+/* No compound literal: drivers keep the pointer, and a literal within a function would be gone by then. */
+static const canopy_can_acceptance_t canopy_can_everything = {.everything = true};
+
 /** Every data and remote frame. */
-#define CANOPY_CAN_ACCEPT_EVERYTHING (&(const canopy_can_acceptance_t){.everything = true})
+#define CANOPY_CAN_ACCEPT_EVERYTHING (&canopy_can_everything)
 
 /** True when the list is one that a driver can be opened with: not NULL, no id too many, no circle. O(lists). */
 static inline bool canopy_can_acceptance_is_valid(const canopy_can_acceptance_t *acceptance)

@@ -67,6 +67,13 @@ typedef enum {
     CANOPY_CAN_CONTROLLER_GONE     /**< The interface does not exist any more. */
 } canopy_can_controller_t;
 
+/** What a cycle worked with besides its frames. A replay tells the loop what it was. */
+typedef struct {
+    uint8_t can_state; /**< A canopy_can_state_t. */
+    bool overload;     /**< canopy_cycle_t.overload. */
+    bool returning;    /**< Safe values went out instead of the tree's, because the bus had been unusable. */
+} canopy_can_conditions_t;
+
 /** What has become of a frame that send() took. */
 typedef enum {
     CANOPY_CAN_PENDING = 0, /**< Waits for the bus, or is on it. */
@@ -119,6 +126,11 @@ typedef struct {
      * @return 1 a frame is waiting, 0 time is over, negative canopy_error_t.
      */
     int (*wait)(void *context, uint32_t timeout_us);
+    /**
+     * What the cycle at hand worked with when it was recorded; asked after its frames were taken. The loop then does not
+     * judge by itself. NULL but for a replay.
+     */
+    void (*conditions)(void *context, canopy_can_conditions_t *conditions);
     /** Copies the counters. O(1). NULL: there are none. */
     void (*stats)(void *context, canopy_can_stats_t *stats);
     uint8_t mailboxes; /**< Frames that the hardware can hold, 1..CANOPY_CAN_MAILBOXES_MAX; 0 is 1. */

@@ -54,7 +54,7 @@ typedef struct {
     uint8_t *sent;      /**< node_count bytes: the status code last sent of each node. */
     uint16_t next_node; /**< Where the next snapshot starts. */
     uint8_t sequence;
-    uint8_t conditions; /**< The bus state and the overload that CanopyArrivals told last. */
+    uint8_t conditions; /**< The bus state, the overload, the return that CanopyArrivals told last. */
 } canopy_trace_state_t;
 
 /** What goes with a tick into the trace. */
@@ -66,6 +66,7 @@ typedef struct {
         *cycle; /**< What the tick was handed; CanopyInputs has room for a time of 2^48 us, 8.9 years. */
     const canopy_bus_state_t *bus; /**< What it has taken. */
     canopy_time_t until;           /**< When the trace frames must be out [us]. */
+    bool returning;                /**< Safe values were posted instead of the tree's (canopy_loop_t.returning). */
     bool is_filtered;              /**< The driver hands over no unknown frames: there is no count of them. */
 } canopy_trace_tick_t;
 
