@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /** @file The transmit context: from what was posted to the driver's mailboxes. The contract is in tx.h. */
 #include <stddef.h>
+#include <string.h>
 
 #include "canopy/count.h"
 #include "canopy/e2e.h"
@@ -218,9 +219,7 @@ static bool copy(canopy_tx_t *self, uint16_t index, canopy_can_frame_t *frame, c
         atomic_store_explicit(&slot->reading, 0u, memory_order_release);
         return false;
     }
-    for (uint8_t byte = 0; byte < message->length; byte++) {
-        frame->data[byte] = data[byte];
-    }
+    memcpy(frame->data, data, message->length);
     box->until = slot->until[buffer];
     atomic_store_explicit(&slot->reading, 0u, memory_order_release);
     box->version = latest >> 2;

@@ -42,8 +42,8 @@ void controller_filter(controller_t *self, controller_filter_t filter)
 void controller_raise(controller_t *self)
 {
     if (self->interrupt.due == NEVER) {
-        self->interrupt.due =
-            self->world->now + self->config.latency_ns + random_between(&self->random, 0, self->config.latency_jitter_ns);
+        self->interrupt.due = self->world->now + self->config.latency_ns +
+                              random_between(&self->random, 0, self->config.latency_jitter_ns);
     }
 }
 
@@ -251,8 +251,7 @@ void controller_receive_error(controller_t *self, unsigned errors)
 
 canopy_can_controller_t controller_state(const controller_t *self)
 {
-    unsigned errors =
-        self->transmit_errors > self->receive_errors ? self->transmit_errors : self->receive_errors;
+    unsigned errors = self->transmit_errors > self->receive_errors ? self->transmit_errors : self->receive_errors;
 
     if (self->bus_off) {
         return CANOPY_CAN_CONTROLLER_BUS_OFF;

@@ -38,25 +38,25 @@ typedef struct {
 
 /** How a controller is made. */
 typedef struct {
-    uint8_t mailboxes;         /**< 1..CONTROLLER_MAILBOXES_MAX */
-    bool in_order;             /**< Mailboxes leave in the order in which they were filled; else the lowest id first. */
-    bool keeps_at_bus_off;     /**< What waits at bus-off leaves after the recovery; else it is aborted then. */
-    uint8_t depth;             /**< Of each receive FIFO, 1..CONTROLLER_FIFO_MAX. */
-    bool overwrites;           /**< A full FIFO loses its newest frame for the new one; else the new one is lost. */
-    uint8_t stamp_bits;        /**< Width of the receive stamps' timer, 1..32. */
-    uint32_t stamp_ns;         /**< Length of one count of that timer. */
-    uint32_t latency_ns;       /**< From an interrupt's cause to its service, at least. */
-    uint32_t latency_jitter_ns;/**< And so much more at most, at random. */
+    uint8_t mailboxes;     /**< 1..CONTROLLER_MAILBOXES_MAX */
+    bool in_order;         /**< Mailboxes leave in the order in which they were filled; else the lowest id first. */
+    bool keeps_at_bus_off; /**< What waits at bus-off leaves after the recovery; else it is aborted then. */
+    uint8_t depth;         /**< Of each receive FIFO, 1..CONTROLLER_FIFO_MAX. */
+    bool overwrites;       /**< A full FIFO loses its newest frame for the new one; else the new one is lost. */
+    uint8_t stamp_bits;    /**< Width of the receive stamps' timer, 1..32. */
+    uint32_t stamp_ns;     /**< Length of one count of that timer. */
+    uint32_t latency_ns;   /**< From an interrupt's cause to its service, at least. */
+    uint32_t latency_jitter_ns; /**< And so much more at most, at random. */
 } controller_config_t;
 
 /** Three mailboxes, lowest id first, FIFOs of 3, a stamp of 16 bits that counts bits at 500 kbit/s: a common part. */
-#define CONTROLLER_COMMON                                                                                              \
-    ((controller_config_t){.mailboxes = 3,                                                                             \
-                           .keeps_at_bus_off = true,                                                                   \
-                           .depth = 3,                                                                                 \
-                           .stamp_bits = 16,                                                                           \
-                           .stamp_ns = 2000,                                                                           \
-                           .latency_ns = 3000,                                                                         \
+#define CONTROLLER_COMMON                            \
+    ((controller_config_t){.mailboxes = 3,           \
+                           .keeps_at_bus_off = true, \
+                           .depth = 3,               \
+                           .stamp_bits = 16,         \
+                           .stamp_ns = 2000,         \
+                           .latency_ns = 3000,       \
                            .latency_jitter_ns = 7000})
 
 typedef enum { MAILBOX_FREE, MAILBOX_PENDING, MAILBOX_SENT, MAILBOX_ABORTED } mailbox_state_t;
@@ -95,14 +95,14 @@ typedef struct controller {
     unsigned transmit_errors; /* TEC */
     unsigned receive_errors;  /* REC */
     bool bus_off;
-    bool recovering;          /* counts recessive bits */
-    bool cannot_drive;        /* its transmitter is broken: no bit of it reaches the wire, and it notices */
-    unsigned recovery_left;   /* sequences of 11 recessive bits */
+    bool recovering;        /* counts recessive bits */
+    bool cannot_drive;      /* its transmitter is broken: no bit of it reaches the wire, and it notices */
+    unsigned recovery_left; /* sequences of 11 recessive bits */
     nanoseconds_t recovery_from;
     nanoseconds_t suspended_until; /* an error-passive transmitter waits a little longer */
     uint32_t sent;
     uint32_t bus_offs;
-    uint32_t error_frames;    /* that it saw */
+    uint32_t error_frames; /* that it saw */
     actor_t interrupt;
     void (*isr)(void *context);
     void *isr_context;

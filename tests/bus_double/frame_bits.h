@@ -12,9 +12,10 @@
 #include "canopy/can.h"
 
 enum {
-    FRAME_BITS_MAX = 160,   /**< Start of frame to the CRC's last bit, 29-bit id, 8 bytes, most stuff bits: 147. */
-    ACK_SLOT_END = 2,       /**< From the end of the CRC: its delimiter, then the slot. */
-    VALID_FOR_RECEIVER = 7, /**< From the end of the slot: the slot's delimiter, and 6 of the 7 bits of the end of frame. */
+    FRAME_BITS_MAX = 160, /**< Start of frame to the CRC's last bit, 29-bit id, 8 bytes, most stuff bits: 147. */
+    ACK_SLOT_END = 2,     /**< From the end of the CRC: its delimiter, then the slot. */
+    VALID_FOR_RECEIVER =
+        7, /**< From the end of the slot: the slot's delimiter, and 6 of the 7 bits of the end of frame. */
     INTERMISSION = 3,
     FRAME_TAIL = ACK_SLOT_END + VALID_FOR_RECEIVER + 1 + INTERMISSION /**< 13: what comes after the CRC. */
 };

@@ -19,9 +19,15 @@ uint16_t peer_number(const canopy_can_frame_t *frame)
     return (uint16_t)(frame->data[at] | ((unsigned)frame->data[at + 1u] << 8));
 }
 
+/** That it sends; peer_init() has checked that each has a mailbox. */
+static uint8_t message_count(const peer_t *self)
+{
+    return (uint8_t)self->app->bus->rx_count;
+}
+
 static void note_sent(peer_t *self)
 {
-    for (uint8_t index = 0; index < self->app->bus->rx_count; index++) {
+    for (uint8_t index = 0; index < message_count(self); index++) {
         if (self->loaded[index] && self->controller.mailboxes[index].state != MAILBOX_PENDING) {
             if (self->controller.mailboxes[index].state == MAILBOX_SENT) {
                 self->counter[index] = (uint8_t)((self->counter[index] + 1u) % CANOPY_E2E_COUNTERS);
@@ -39,7 +45,8 @@ static void take_command(peer_t *self, const canopy_can_frame_t *frame)
         const canopy_tx_message_t *message = &self->app->bus->tx[index];
         peer_command_t *command = &self->commands[index];
 
-        if (frame->id != message->id || (frame->flags & CANOPY_CAN_EXTENDED) != (message->flags & CANOPY_CAN_EXTENDED)) {
+        if (frame->id != message->id ||
+            (frame->flags & CANOPY_CAN_EXTENDED) != (message->flags & CANOPY_CAN_EXTENDED)) {
             continue;
         }
         if (message->data_id != CANOPY_E2E_NONE &&
@@ -69,7 +76,7 @@ static void send(void *context)
     peer_t *self = context;
 
     self->timer.due = self->controller.world->now + self->period;
-    for (uint8_t index = 0; !self->silent && index < self->app->bus->rx_count; index++) {
+    for (uint8_t index = 0; !self->silent && index < message_count(self); index++) {
         const canopy_rx_message_t *message = &self->app->bus->rx[index];
         canopy_can_frame_t frame = {.id = message->id, .flags = message->flags, .length = message->length};
 

@@ -30,11 +30,11 @@ typedef struct {
     controller_t controller;
     actor_t timer;
     nanoseconds_t period;
-    bool silent;               /**< Sends no more; it still acknowledges. */
+    bool silent; /**< Sends no more; it still acknowledges. */
     uint8_t counter[PEER_MESSAGES_MAX];
     bool loaded[PEER_MESSAGES_MAX];
-    uint16_t first_number;     /**< Change it before the run where the values of a message must be in another range. */
-    uint16_t number;           /**< Of the last message. */
+    uint16_t first_number; /**< Change it before the run where the values of a message must be in another range. */
+    uint16_t number;       /**< Of the last message. */
     nanoseconds_t on_wire_at[PEER_NUMBERS]; /**< By number: the end of the frame. */
     nanoseconds_t last_on_wire;
     uint32_t sent;

@@ -158,7 +158,8 @@ static void stats(void *context, canopy_can_stats_t *counters)
     *counters = (canopy_can_stats_t){
         .received = self->received,
         .sent = self->controller.sent,
-        .rx_dropped = self->controller.fifos[0].lost + self->controller.fifos[1].lost + canopy_ring_dropped(&self->ring),
+        .rx_dropped =
+            self->controller.fifos[0].lost + self->controller.fifos[1].lost + canopy_ring_dropped(&self->ring),
         .error_frames = self->controller.error_frames,
         .rx_high_water = canopy_ring_high_water(&self->ring),
     };

@@ -19,18 +19,18 @@
 /** What a rig is made of. All zero: one common controller with an interrupt, abort and filters; nobody else on the bus. */
 typedef struct {
     const canopy_app_t *app;
-    uint8_t mailboxes;               /**< 0: those of `controller`. */
-    bool polled;                     /**< No interrupts. */
+    uint8_t mailboxes; /**< 0: those of `controller`. */
+    bool polled;       /**< No interrupts. */
     bool cannot_abort;
-    bool unfiltered;                 /**< The driver takes everything. */
+    bool unfiltered;                       /**< The driver takes everything. */
     const controller_config_t *controller; /**< NULL: CONTROLLER_COMMON. */
-    uint32_t queue;                  /**< Frames in the queue of a driver like SocketCAN; 0: not like it. */
-    bool no_echo;                    /**< Of such a driver. */
-    unsigned fifos;                  /**< 2: the acceptance list is split over two FIFOs. */
+    uint32_t queue;                        /**< Frames in the queue of a driver like SocketCAN; 0: not like it. */
+    bool no_echo;                          /**< Of such a driver. */
+    unsigned fifos;                        /**< 2: the acceptance list is split over two FIFOs. */
     traffic_config_t traffic;
-    nanoseconds_t peer_period;       /**< 0: the application's. */
-    nanoseconds_t peer_phase;        /**< Its messages come so much after a tick. */
-    uint32_t rx_max;                 /**< As in the loop's configuration. */
+    nanoseconds_t peer_period; /**< 0: the application's. */
+    nanoseconds_t peer_phase;  /**< Its messages come so much after a tick. */
+    uint32_t rx_max;           /**< As in the loop's configuration. */
 } rig_options_t;
 
 /** One fault that the loop reported. */
@@ -51,10 +51,10 @@ typedef struct rig {
     canopy_clock_t clock;
     canopy_loop_config_t config;
     canopy_loop_t loop;
-    nanoseconds_t end; /* the loop is told to stop then */
+    nanoseconds_t end;        /* the loop is told to stop then */
     nanoseconds_t stopped_at; /* when canopy_loop_run() came back */
     uint32_t from_controller;
-    rig_fault_t faults[8]; /* by canopy_fault_t */
+    rig_fault_t faults[8];                                                            /* by canopy_fault_t */
     void (*saw)(struct rig *rig, const canopy_can_frame_t *frame, nanoseconds_t end); /* a frame of the application */
     void (*after)(struct rig *rig);                                                   /* a cycle */
 } rig_t;

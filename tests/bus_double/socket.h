@@ -30,7 +30,7 @@ typedef struct {
     uint32_t queue_length;
     uint32_t first;
     uint32_t waiting;
-    uint32_t highest; /* most frames ever in it */
+    uint32_t highest;             /* most frames ever in it */
     canopy_can_outcome_t outcome; /* of the frame that was handed over last */
     socket_link_t link;
     uint32_t restarts;

@@ -205,7 +205,7 @@ static void test_interrupts_have_a_latency(void)
     interrupts = 0;
     fill(0, 0x100);
     run_us(1000);
-    end = (frame_length(&sender.mailboxes[0].frame) - 4u) * BIT_NS; /* valid one bit before the end */
+    end = (frame_length(&sender.mailboxes[0].frame) - 4u) * (nanoseconds_t)BIT_NS; /* valid one bit before the end */
     TEST_ASSERT_EQUAL_UINT(1, interrupts);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(end + 50000u, interrupt_at);
     TEST_ASSERT_LESS_OR_EQUAL_UINT64(end + 70000u, interrupt_at);
@@ -236,7 +236,7 @@ static void watch_runs(void *context, const canopy_can_frame_t *frame, const con
 {
     (void)context;
     (void)from;
-    run_of_frames = begin == last_end + 3u * BIT_NS ? run_of_frames : 0u;
+    run_of_frames = begin == last_end + 3u * (nanoseconds_t)BIT_NS ? run_of_frames : 0u;
     run_of_frames += frame_length(frame) * (nanoseconds_t)BIT_NS;
     longest_run = run_of_frames > longest_run ? run_of_frames : longest_run;
     last_end = end;

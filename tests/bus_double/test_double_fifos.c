@@ -12,10 +12,10 @@
 #include "unity.h"
 
 static rig_t rig;
-static canopy_can_t checked;        /* the driver, looked at by the test */
-static canopy_time_t last_time;     /* of the last received frame */
+static canopy_can_t checked;    /* the driver, looked at by the test */
+static canopy_time_t last_time; /* of the last received frame */
 static uint32_t received;
-static uint32_t most_early_us;      /* a frame's time before the end of its last bit */
+static uint32_t most_early_us; /* a frame's time before the end of its last bit */
 static uint32_t out_of_order;
 static uint32_t overloaded;
 static uint32_t oldest_ms;
@@ -126,8 +126,8 @@ static void test_a_fifo_that_overflows_is_overload(void)
         TEST_ASSERT_UINT32_WITHIN(5, rig.loop.ticks, overloaded);
         TEST_ASSERT_UINT32_WITHIN(5, rig.loop.ticks, rig.faults[CANOPY_FAULT_RX_LOST].count);
         /* All but the few after the last tick. */
-        TEST_ASSERT_LESS_OR_EQUAL_UINT32(
-            rig.port.controller.fifos[0].lost + rig.port.controller.fifos[1].lost, rig.loop.rx_lost);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT32(rig.port.controller.fifos[0].lost + rig.port.controller.fifos[1].lost,
+                                         rig.loop.rx_lost);
         TEST_ASSERT_GREATER_THAN_UINT32(40u * rig.loop.ticks, rig.loop.rx_lost);
         TEST_ASSERT_EQUAL_UINT32(0, out_of_order);
     }

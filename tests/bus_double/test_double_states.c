@@ -156,7 +156,8 @@ static void check_bus_off(nanoseconds_t length)
         pause = 2u * pause < CANOPY_CAN_RESTART_LONGEST_US * NS_PER_US ? 2u * pause
                                                                        : CANOPY_CAN_RESTART_LONGEST_US * NS_PER_US;
         TEST_ASSERT_GREATER_OR_EQUAL_UINT64(pause, attempts[index] - attempts[index - 1u] + NS_PER_MS);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT64(pause + 6u * PERIOD_MS * NS_PER_MS, attempts[index] - attempts[index - 1u]);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT64(pause + 6u * (nanoseconds_t)PERIOD_MS * NS_PER_MS,
+                                         attempts[index] - attempts[index - 1u]);
     }
 }
 

@@ -108,8 +108,8 @@ static void check(const rig_options_t *options, const char *what)
 
     start(options);
     TEST_ASSERT_EQUAL(CANOPY_OK, rig_run(&rig, rig.world.now + length - NS_PER_US));
-    printf("%s, %s: %" PRIu32 " ticks, %" PRIu32 " frames of the controller, stopped in %" PRIu64 " us\n", TEST_APP.name,
-           what, rig.loop.ticks, rig.from_controller, (rig.stopped_at - rig.end) / NS_PER_US);
+    printf("%s, %s: %" PRIu32 " ticks, %" PRIu32 " frames of the controller, stopped in %" PRIu64 " us\n",
+           TEST_APP.name, what, rig.loop.ticks, rig.from_controller, (rig.stopped_at - rig.end) / NS_PER_US);
     check_all_left();
 }
 

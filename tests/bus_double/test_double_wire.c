@@ -97,7 +97,7 @@ static void test_the_lowest_id_of_all_goes_first(void)
         TEST_ASSERT_EQUAL_HEX32(0x100u * (index + 1u), seen.ids[index]);
     }
     /* Back to back: the next begins after the three bits of intermission. */
-    TEST_ASSERT_EQUAL_UINT64(seen.ends[0] + 3u * BIT_NS, seen.starts[1]);
+    TEST_ASSERT_EQUAL_UINT64(seen.ends[0] + 3u * (nanoseconds_t)BIT_NS, seen.starts[1]);
 }
 
 static void test_the_same_id_from_two_is_an_error_for_both(void)

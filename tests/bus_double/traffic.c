@@ -4,7 +4,9 @@
 
 #include "frame_bits.h"
 
-enum { PER_MILLE = 1000, MAILBOXES = 3 };
+enum { PER_MILLE = 1000 };
+
+#define MAILBOXES 3u
 
 static void load(void *context)
 {

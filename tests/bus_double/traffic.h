@@ -33,7 +33,7 @@ typedef struct {
     controller_t controller;
     actor_t actor;
     uint32_t random;
-    uint64_t saved_ns;        /* of the bus, times 1000 */
+    uint64_t saved_ns; /* of the bus, times 1000 */
     nanoseconds_t saved_at;
     canopy_can_frame_t backlog[TRAFFIC_BACKLOG];
     uint32_t first;

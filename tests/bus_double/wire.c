@@ -11,8 +11,8 @@
 enum {
     ERROR_FLAG = 6,
     ERROR_DELIMITER = 8,
-    ERRORS_EACH = 8,       /* bits and errors, on a wire that is held dominant: rule 6 */
-    TOLERATED = 14         /* dominant bits after the start of an error flag, before the first such step */
+    ERRORS_EACH = 8, /* bits and errors, on a wire that is held dominant: rule 6 */
+    TOLERATED = 14   /* dominant bits after the start of an error flag, before the first such step */
 };
 
 static nanoseconds_t bits(const wire_t *self, unsigned count)
@@ -171,30 +171,31 @@ static void fail(wire_t *self, bool acknowledged)
 
 static void deliver(wire_t *self)
 {
+    const controller_t *from = NULL;
+
     for (unsigned index = 0; index < self->count; index++) {
         controller_t *controller = self->controllers[index];
 
         if (controller->on_wire < 0 && !controller->bus_off) {
             controller_hear(controller, &self->frame);
+        } else if (controller->on_wire >= 0) {
+            from = controller;
         }
+    }
+    if (self->watch != NULL) {
+        self->watch(self->watch_context, &self->frame, from, self->start, self->world->now + bits(self, 1));
     }
 }
 
 static void complete(wire_t *self)
 {
-    const controller_t *from = NULL;
-
     self->frames++;
     self->busy_ns += self->world->now + bits(self, INTERMISSION) - self->start;
     enter(self, WIRE_INTERMISSION, INTERMISSION);
     for (unsigned index = 0; index < self->count; index++) {
         if (self->controllers[index]->on_wire >= 0) {
-            from = self->controllers[index];
             controller_sent(self->controllers[index]);
         }
-    }
-    if (self->watch != NULL) {
-        self->watch(self->watch_context, &self->frame, from, self->start, self->world->now);
     }
 }
 

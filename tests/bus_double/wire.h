@@ -25,7 +25,7 @@ typedef enum {
     WIRE_LAST_BIT,     /* valid for the transmitter */
     WIRE_ERROR,        /* error flag and delimiter */
     WIRE_INTERMISSION,
-    WIRE_DOMINANT      /* somebody holds it */
+    WIRE_DOMINANT /* somebody holds it */
 } wire_phase_t;
 
 /** Who watches the wire. */
@@ -42,7 +42,7 @@ typedef struct wire {
     canopy_can_frame_t frame; /* on the wire */
     nanoseconds_t start;
     nanoseconds_t recessive_since;
-    bool fails; /* the frame on the wire ends in an error that is no missing acknowledgement */
+    bool fails;            /* the frame on the wire ends in an error that is no missing acknowledgement */
     bool fails_for_sender; /* and only the sender sees it */
     bool dominant;
     uint32_t disturbed; /* the next so many frames fail */
@@ -60,7 +60,7 @@ void wire_init(wire_t *self, world_t *world, uint32_t bit_rate);
 /** Connects a controller to a wire, and so disconnects it from the one it was at. A frame of it on the wire is cut off. */
 void wire_plug(wire_t *self, controller_t *controller);
 
-/** Tells of each frame that is out: called at the end of its last bit, before the intermission. */
+/** Tells of each frame that is out: called when receivers have it, one bit before its end, which it tells. */
 void wire_set_watch(wire_t *self, wire_watch_t watch, void *context);
 
 /** Holds the wire dominant (a short circuit), or lets go of it. */

@@ -8,7 +8,6 @@
  *
  *   send FRAME          1, 0 or the error's number
  *   outcome             of the frame sent last: pending, sent or aborted
- *   abort               "asked"
  *   state               of the controller, as a number
  *   restart             "tried"
  *   advice NUMBER       its text, or "none"
@@ -176,9 +175,6 @@ static bool obey(const char *line)
         printf("%d\n", port.can->send(port.can->context, 0, &frame));
     } else if (is_command(line, "outcome", &argument)) {
         print_outcome();
-    } else if (is_command(line, "abort", &argument) && port.can->abort != NULL) {
-        port.can->abort(port.can->context, 0);
-        printf("asked\n");
     } else if (is_command(line, "state", &argument)) {
         printf("%d\n", (int)port.can->state(port.can->context));
     } else if (is_command(line, "restart", &argument)) {

@@ -39,7 +39,9 @@ static void the_state_follows_from_what_controller_and_transmit_side_say(void)
     for (unsigned from = 0; from < 2u * rows; from++) { /* every transition */
         for (unsigned to = 0; to < 2u * rows; to++) {
             canopy_can_state_t before = from % 2u != 0u ? table[from / 2u].blocked : table[from / 2u].free;
-            canopy_can_state_t after = to % 2u != 0u ? table[to / 2u].blocked : table[to / 2u].free;
+            /* What stood still while the bus was unusable says nothing of the one that has just come back. */
+            bool counts = to % 2u != 0u && !canopy_can_is_unusable(before);
+            canopy_can_state_t after = counts ? table[to / 2u].blocked : table[to / 2u].free;
 
             setUp();
             TEST_ASSERT_EQUAL(before, step(table[from / 2u].controller, from % 2u != 0u, 1000));
@@ -69,6 +71,12 @@ static void a_driver_that_does_not_know_is_error_active(void)
 
     TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, canopy_can_manager_step(&manager, &simple, false, 0));
     TEST_ASSERT_EQUAL(CANOPY_CAN_BLOCKED, canopy_can_manager_step(&manager, &simple, true, 0));
+}
+
+static void a_number_that_is_no_state_is_error_active(void)
+{
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE,
+                      step((canopy_can_controller_t)(CANOPY_CAN_CONTROLLER_GONE + 1), false, 0));
 }
 
 static void a_driver_that_comes_back_by_itself_is_not_restarted(void)
@@ -171,6 +179,7 @@ int main(void)
     RUN_TEST(the_state_follows_from_what_controller_and_transmit_side_say);
     RUN_TEST(only_from_bus_off_on_is_a_bus_unusable);
     RUN_TEST(a_driver_that_does_not_know_is_error_active);
+    RUN_TEST(a_number_that_is_no_state_is_error_active);
     RUN_TEST(a_driver_that_comes_back_by_itself_is_not_restarted);
     RUN_TEST(the_pause_between_attempts_doubles_up_to_a_limit);
     RUN_TEST(once_settled_the_pause_is_the_shortest_again);

@@ -175,6 +175,28 @@ static void of_several_loops_the_shortest_frame_sets_the_pause(void)
     TEST_ASSERT_EQUAL_UINT64(100, waits[2]);
 }
 
+static int deaf_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
+{
+    (void)context;
+    (void)mailbox;
+    (void)frame;
+    return 0;
+}
+
+static void only_the_loops_that_have_frames_waiting_are_served(void)
+{
+    canopy_loop_t *const both[] = {&loop, &other};
+    const canopy_can_t deaf = {.receive = boxes_receive, .send = deaf_send};
+
+    other_config.can = &deaf;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&other, &other_config));
+    boxes.taken_is = CANOPY_CAN_SENT;
+    waits_max = 6; /* both ticks, and four services of the other */
+    (void)canopy_loop_run_all(both, 2);
+    TEST_ASSERT_EQUAL_UINT64(4 * FRAME_US, waits[5]);
+    TEST_ASSERT_EQUAL_UINT(2 * TX, boxes.offered); /* in the tick, and in the stop */
+}
+
 /* --- stop ----------------------------------------------------------------------------------------------------------- */
 
 static void stop_waits_until_the_safe_values_are_out(void)
@@ -251,14 +273,6 @@ static void stop_works_with_a_transmit_interrupt(void)
     TEST_ASSERT_GREATER_THAN_UINT(2, boxes.requests);
 }
 
-static int deaf_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
-{
-    (void)context;
-    (void)mailbox;
-    (void)frame;
-    return 0;
-}
-
 static void a_run_says_whether_all_safe_values_are_out(void)
 {
     canopy_loop_t *const both[] = {&loop, &other};
@@ -287,6 +301,7 @@ int main(void)
     RUN_TEST(what_a_blocked_bus_holds_up_does_not_hold_up_the_ticks);
     RUN_TEST(the_end_may_come_between_two_ticks);
     RUN_TEST(of_several_loops_the_shortest_frame_sets_the_pause);
+    RUN_TEST(only_the_loops_that_have_frames_waiting_are_served);
     RUN_TEST(stop_waits_until_the_safe_values_are_out);
     RUN_TEST(stop_waits_for_the_trace_of_the_last_tick_too);
     RUN_TEST(stop_ends_when_the_bus_lets_nothing_out);

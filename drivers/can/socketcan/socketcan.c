@@ -208,7 +208,6 @@ canopy_error_t canopy_socketcan_open(canopy_socketcan_t *self, const char *inter
                                .receive = socketcan_receive,
                                .send = canopy_socketcan_send,
                                .outcome = canopy_socketcan_outcome,
-                               .abort = canopy_socketcan_abort,
                                .state = canopy_socketcan_state,
                                .restart = canopy_socketcan_restart,
                                .wait = socketcan_wait,

@@ -84,8 +84,6 @@ void canopy_socketcan_take_echo(canopy_socketcan_t *self, const struct canfd_fra
 static void take_off(canopy_socketcan_t *self, const struct canfd_frame *raw)
 {
     self->flight.outcome = CANOPY_CAN_PENDING;
-    self->flight.must_back = false;
-    self->flight.since = canopy_socketcan_now();
     self->flight.id = raw->can_id;
     self->flight.length = raw->len;
     self->flight.flags = raw->flags;
@@ -111,18 +109,23 @@ static int prepare_echo(canopy_socketcan_t *self, uint32_t id)
 /** @return 1 the kernel has it, 0 its queue is full, negative canopy_error_t */
 static int hand_over(canopy_socketcan_t *self, const struct canfd_frame *raw, size_t size)
 {
-    ssize_t written;
+    ssize_t written = -1;
+    canopy_error_t error = CANOPY_ERROR_BUS_DOWN;
 
-    do {
-        written = send(self->socket, raw, size, MSG_DONTWAIT);
-    } while (written < 0 && errno == EINTR);
+    /* The first answer may be an old one: that the link was down a while ago, which each socket is told once. */
+    for (unsigned attempt = 0; written < 0 && error == CANOPY_ERROR_BUS_DOWN && attempt < 2u; attempt++) {
+        do {
+            written = send(self->socket, raw, size, MSG_DONTWAIT);
+        } while (written < 0 && errno == EINTR);
+        error = written < 0 ? canopy_socketcan_error(self, errno) : CANOPY_ERROR_IO;
+    }
     if (written == (ssize_t)size) {
         return 1;
     }
     if (written < 0 && (errno == ENOBUFS || errno == EAGAIN)) {
         return 0;
     }
-    return canopy_socketcan_error(self, written < 0 ? errno : EIO);
+    return error;
 }
 
 int canopy_socketcan_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
@@ -164,14 +167,6 @@ static bool has_left_queue(const canopy_socketcan_t *self)
     return getsockopt(self->socket, SOL_SOCKET, SO_MEMINFO, info, &size) != 0 || info[SK_MEMINFO_WMEM_ALLOC] == 0u;
 }
 
-static void flush_when_blocked(canopy_socketcan_t *self)
-{
-    if (self->knowledge == CANOPY_SOCKETCAN_BY_QUEUE && self->flight.must_back && self->may_switch &&
-        canopy_socketcan_now() - self->flight.since >= CANOPY_SOCKETCAN_FLUSH_US && canopy_socketcan_switch(self)) {
-        canopy_socketcan_lose_flight(self);
-    }
-}
-
 canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox)
 {
     canopy_socketcan_t *self = context;
@@ -182,17 +177,6 @@ canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox)
         if (self->knowledge == CANOPY_SOCKETCAN_BY_QUEUE && has_left_queue(self)) {
             settle(self, CANOPY_CAN_SENT);
         }
-        if (self->flight.outcome == CANOPY_CAN_PENDING) {
-            flush_when_blocked(self);
-        }
     }
     return self->flight.outcome;
-}
-
-void canopy_socketcan_abort(void *context, uint8_t mailbox)
-{
-    canopy_socketcan_t *self = context;
-
-    (void)mailbox;
-    self->flight.must_back = true; /* outcome() does it, if it is possible, when the frame has been blocked for long */
 }

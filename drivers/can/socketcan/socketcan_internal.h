@@ -22,7 +22,6 @@ canopy_error_t canopy_socketcan_error(canopy_socketcan_t *self, int number);
 
 int canopy_socketcan_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame);
 canopy_can_outcome_t canopy_socketcan_outcome(void *context, uint8_t mailbox);
-void canopy_socketcan_abort(void *context, uint8_t mailbox);
 
 /** The frame that is with the kernel, if any, never leaves: the interface has dropped it. */
 void canopy_socketcan_lose_flight(canopy_socketcan_t *self);
@@ -42,10 +41,10 @@ void canopy_socketcan_restart(void *context);
 
 /** What the kernel says of an interface. */
 typedef struct {
-    bool has_echo;         /**< IFF_ECHO */
-    bool has_queue;        /**< Frames may wait in the kernel. */
-    bool is_controller;    /**< It has the attributes of a CAN controller. */
-    bool restarts_itself;  /**< restart-ms is not 0. */
+    bool has_echo;                      /**< IFF_ECHO */
+    bool has_queue;                     /**< Frames may wait in the kernel. */
+    bool is_controller;                 /**< It has the attributes of a CAN controller. */
+    bool restarts_itself;               /**< restart-ms is not 0. */
     canopy_can_controller_t controller; /**< Error state. */
 } canopy_socketcan_link_t;
 

@@ -4,8 +4,8 @@
  * CAN driver for Linux SocketCAN (raw sockets): real controllers, vcan, slcan, and all that the kernel has.
  *
  * Threads: everything is called from the loop's thread. Signals end a wait early.
- * Blocking: only wait blocks. The rest is a few system calls each; restart, and outcome where it flushes (below), switch an
- * interface off and on, which takes as long as its kernel driver needs.
+ * Blocking: only wait blocks. The rest is a few system calls each; restart may switch an interface off and on, which takes
+ * as long as its kernel driver needs.
  * Memory: the object is the caller's; nothing is allocated.
  *
  * Arrival: the kernel stamps received frames; the stamp is brought to CLOCK_MONOTONIC, so that setting the wall clock makes
@@ -15,8 +15,8 @@
  * an echo at most one frame is with the kernel at any time, and the next one follows when the echo says that it is out.
  * So when the bus is blocked at most that one leaves late, whatever the length of the interface's queue. Without an echo a
  * frame counts as out when it has left the kernel's queue: what the adapter holds then may leave late, and
- * canopy_socketcan_advice() says so. One that is blocked in that queue when it is to be taken back is flushed by switching
- * the interface off and on, if the process may (CAP_NET_ADMIN).
+ * canopy_socketcan_advice() says so. Nothing is ever taken back: switching the interface off and on would empty the
+ * kernel's queue, but not the adapter, and each time lets one more frame into it.
  *
  * Losses: rx_dropped is the kernel's count of frames that did not fit into the socket's buffer (SO_RXQ_OVFL). The kernel
  * tells it with the next frame received, so it is up to date once the buffer has been drained and a frame has come.
@@ -25,7 +25,8 @@
  * State: from error frames, from the interface's flags (looked at every CANOPY_SOCKETCAN_LOOK_US) and from failed calls.
  * restart() brings a controller back from bus-off where the kernel does not (`restart-ms` 0) and the process may; and it
  * opens an interface that was removed and made anew. One that is switched off is waited for. send, receive and wait give
- * CANOPY_ERROR_BUS_DOWN, receive and wait once each time the link goes down.
+ * CANOPY_ERROR_BUS_DOWN, receive and wait at most once each time the link goes down. The count of error frames is up to date
+ * after state().
  */
 #ifndef CANOPY_CAN_SOCKETCAN_H
 #define CANOPY_CAN_SOCKETCAN_H
@@ -40,9 +41,6 @@
 
 /** How often the interface's flags are looked at [us]; a failed call lets the driver look at once. */
 #define CANOPY_SOCKETCAN_LOOK_US 50000u
-
-/** A frame that must be taken back is flushed after so long in the kernel's queue [us], where that is possible. */
-#define CANOPY_SOCKETCAN_FLUSH_US 100000u
 
 /** Frames taken from the kernel with one call. */
 #define CANOPY_SOCKETCAN_BATCH 16u
@@ -60,7 +58,7 @@ typedef struct {
     bool fd_frames;   /**< The interface carries CAN FD (its MTU when it was opened). Else FD frames are refused. */
     int socket;       /**< File descriptor, e.g. for poll() with others; -1 when closed. */
     canopy_socketcan_knowledge_t knowledge; /**< How the driver knows that a frame is out. */
-    int events;       /* a second socket: error frames, and the echo of what is sent; -1 when closed */
+    int events; /* a second socket: error frames, and the echo of what is sent; -1 when closed */
     char name[16];
     unsigned index; /* of the interface that the sockets are bound to */
     const canopy_can_acceptance_t *acceptance;
@@ -72,9 +70,7 @@ typedef struct {
     uint64_t next_look;                 /* at the interface's flags, monotonic [us] */
     struct {                            /* what was handed to the kernel */
         canopy_can_outcome_t outcome;
-        bool must_back;      /* abort() was called */
-        uint64_t since;      /* monotonic [us] */
-        uint32_t id;         /* as the kernel writes it */
+        uint32_t id; /* as the kernel writes it */
         uint8_t length;
         uint8_t flags;
         uint8_t data[CANOPY_CAN_DATA_MAX];
