@@ -44,7 +44,21 @@ class Alignment:
         return len(self.other) + len(self.extra), len(self.lacking)
 
 
-def align(recorded: Sequence[Sent], replayed: Sequence[Replayed], ahead: int, may_lack: int, same: Same) -> Alignment:
+@dataclass(frozen=True)
+class Rules:
+    """What an alignment of one message may do."""
+
+    ahead: int
+    """A frame may be of a tick so many behind the one that the trace gives it."""
+    may_lack: int
+    """So many frames may be lacking where the log has another one. Where it has none, any number may."""
+    whole: int
+    """From this tick on any number may."""
+    same: Same
+    """Are a frame of the log and one of the replay equal?"""
+
+
+def align(recorded: Sequence[Sent], replayed: Sequence[Replayed], rules: Rules) -> Alignment:
     """Aligns one message's frames.
 
     A frame of the log is given the first one of the replay that it can be: so before any tick as few as possible are
@@ -53,9 +67,7 @@ def align(recorded: Sequence[Sent], replayed: Sequence[Replayed], ahead: int, ma
     Args:
         recorded: Of the log, with the tick that the trace gives them.
         replayed: Of the replay.
-        ahead: A frame may be of a tick so many behind the one that the trace gives it.
-        may_lack: So many frames may be lacking where the log has another one. Where it has none, any number may.
-        same: Are a frame of the log and one of the replay equal?
+        rules: What is allowed.
     """
     result = Alignment()
     place = now = 0
@@ -65,14 +77,16 @@ def align(recorded: Sequence[Sent], replayed: Sequence[Replayed], ahead: int, ma
             return result
         if place == len(recorded) or recorded[place].tick > frame.tick:
             result.lacking.append(frame)
-        elif recorded[place].tick + ahead < frame.tick:
+        elif recorded[place].tick + rules.ahead < frame.tick:
             result.extra.append(recorded[place])
             now -= 1
             place += 1
-        elif same(recorded[place].data, frame.data):
+        elif rules.same(recorded[place].data, frame.data):
             result.pairs.append((recorded[place], frame))
             place += 1
-        elif len(result.lacking) < may_lack and _comes_later(recorded[place], replayed, now, ahead, same):
+        elif (len(result.lacking) < rules.may_lack or frame.tick >= rules.whole) and _comes_later(
+            recorded[place], replayed, now, rules
+        ):
             result.lacking.append(frame)
         else:
             result.other.append((recorded[place], frame))
@@ -82,11 +96,11 @@ def align(recorded: Sequence[Sent], replayed: Sequence[Replayed], ahead: int, ma
     return result
 
 
-def _comes_later(sent: Sent, replayed: Sequence[Replayed], now: int, ahead: int, same: Same) -> bool:
-    for frame in replayed[now + 1 :]:
-        if frame.tick > sent.tick + ahead:
+def _comes_later(sent: Sent, replayed: Sequence[Replayed], now: int, rules: Rules) -> bool:
+    for later in range(now + 1, len(replayed)):
+        if replayed[later].tick > sent.tick + rules.ahead:
             return False
-        if same(sent.data, frame.data):
+        if rules.same(sent.data, replayed[later].data):
             return True
     return False
 

@@ -15,14 +15,12 @@ from itertools import pairwise
 import can
 
 from canopy.replay import e2e
-from canopy.replay.align import Alignment, Lacking, Replayed, Same, align, not_counted
+from canopy.replay.align import Alignment, Lacking, Replayed, Rules, Same, align, not_counted
 from canopy.replay.explain import explain
-from canopy.replay.log import AHEAD, Bus, Run, Sent, key
+from canopy.replay.log import AHEAD, NEEDED, Bus, Run, Sent, key
 
 NOT_COMPARED = {"CanopyTick": bytes([0] * 7 + [0xFF]), "CanopyHealth": bytes([0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0])}
 """Bits that do not follow from the inputs: Overruns; RxUnknown and TxDropped."""
-_MAY_LACK = ("CanopyHealth", "CanopyModel")
-"""Trace frames that may have been dropped: without the others nothing can be replayed."""
 _COUNTED_AFTER = AHEAD + 1
 """Ticks from the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
 of a tick leaves, all commands of the tick have left or were counted."""
@@ -77,13 +75,7 @@ class Comparison:
         self._ticks = ticks
         self._whole = ticks - 1 if run.gap is None and ticks == len(run.ticks) else ticks
         """Of so many ticks the log has everything: it may end within the last one."""
-        self._counted = [
-            (sent.tick, int.from_bytes(sent.data[4:6], "little"))
-            for number, kind in bus.trace.items()
-            if kind == "CanopyHealth"
-            for sent in run.sent.get(number, [])
-        ]
-        """Tick and TxDropped of each CanopyHealth."""
+        self._counted = run.counted(bus.health)
         self._found: list[tuple[int, Difference]] = []
         """With its place in the replay."""
 
@@ -107,7 +99,7 @@ class Comparison:
         last = self._ticks if first is None else first
         for alignment in alignments.values():
             compared = alignment.pairs + alignment.other
-            result.frames += sum(frame.tick <= last for _, frame in compared)
+            result.frames += sum(frame.tick <= min(last, self._ticks - 1) for _, frame in compared)
             result.dropped += sum(frame.tick < min(last, self._whole) for frame in alignment.lacking)
         self._found.sort(key=lambda found: found[0])
         result.differences = [difference for _, difference in self._found if difference.tick == first]
@@ -120,21 +112,19 @@ class Comparison:
         for order, message in enumerate(frames):
             number = key(message.arbitration_id, message.is_extended_id)
             done += self._bus.trace.get(number) == "CanopyTick"
-            # A command is sent before its tick's CanopyTick.
+            # A command is sent before its tick's CanopyTick. At its end the program sends safe commands: those of no tick,
+            # which may have replaced the last tick's before they left.
             tick = done - 1 if number in self._bus.trace else done
-            if tick >= self._ticks:
-                done = self._ticks
-                break  # the safe commands at the program's end, whose time nobody knows
-            result.setdefault(number, []).append(Replayed(order, tick, bytes(message.data)))
-        return result, done
+            if tick <= self._ticks:
+                result.setdefault(number, []).append(Replayed(order, tick, bytes(message.data)))
+        return result, min(done, self._ticks)
 
     def _align(self, number: int, replayed: Sequence[Replayed]) -> Alignment:
-        kind = self._bus.trace.get(number)
-        may_lack = max((count for _, count in self._counted), default=0) if kind is None or kind in _MAY_LACK else 0
-        recorded, same = self._run.sent.get(number, []), self._same(number)
-        ahead = AHEAD if kind is None else 0
-        starts = self._starts(number, recorded)
-        found = (align(recorded[start:], replayed, ahead, may_lack, same) for start in starts)
+        may_lack = 0 if self._is_needed(number) else max((count for _, count in self._counted), default=0)
+        ahead = 0 if number in self._bus.trace else AHEAD
+        rules = Rules(ahead, may_lack, self._whole, self._same(number))
+        recorded = self._run.sent.get(number, [])
+        found = (align(recorded[start:], replayed, rules) for start in self._starts(number, recorded))
         return min(found, key=Alignment.cost)
 
     def _starts(self, number: int, recorded: Sequence[Sent]) -> list[int]:
@@ -161,6 +151,8 @@ class Comparison:
         """Adds the differences that one message shows by itself."""
         name = self._name(number)
         for sent, frame in alignment.other:
+            if frame.tick >= self._ticks:
+                continue
             for what in explain(self._bus, number, sent.data, frame.data):
                 self._differ(frame.tick, frame.order, name, what, sent.place)
         ahead = 0 if number in self._bus.trace else AHEAD
@@ -198,7 +190,7 @@ class Comparison:
         ]
 
     def _is_needed(self, number: int) -> bool:
-        return number in self._bus.trace and self._bus.trace[number] not in _MAY_LACK
+        return self._bus.trace.get(number) in NEEDED
 
     def _name(self, number: int) -> str:
         return self._bus.sent[number].name if number in self._bus.sent else f"0x{number:X}"

@@ -60,6 +60,8 @@ class Bus:
         """Which kind a trace message is."""
         self.protected: dict[int, int] = {}
         """The E2E data ids of protected commands."""
+        self.health: int | None = None
+        """Key of CanopyHealth; None: it is not there."""
         for need in NEEDED:
             if need not in model.trace:
                 raise ModelError(
@@ -71,6 +73,7 @@ class Bus:
             kind = message.name.partition("_")[0]
             if model.trace.get(kind) == message.frame_id and model.bus_node in message.senders:
                 self.trace[number] = kind
+                self.health = number if kind == "CanopyHealth" else self.health
                 self.sent[number] = message
             elif message.name in model.send:
                 self.sent[number] = message
@@ -110,6 +113,16 @@ class Sent:
     data: bytes
 
 
+@dataclass(frozen=True)
+class Hole:
+    """Trace frames that are missing while the ticks around them are whole."""
+
+    tick: int
+    """Its place in the run."""
+    frames: int
+    text: str
+
+
 @dataclass
 class Run:
     """From the controller's tick 0 to its end, to the log's end, or to the first gap."""
@@ -120,10 +133,17 @@ class Run:
     sent: dict[int, list[Sent]] = field(default_factory=dict)
     doubtful: dict[int, int] = field(default_factory=dict)
     """How many of the first frames of a command may be of a run before."""
+    holes: list[Hole] = field(default_factory=list)
+    """Changes and snapshots that are missing: the controller may have dropped them."""
     gap: str | None = None
     """What is missing in the log behind the last tick; None: nothing."""
     mismatch: str | None = None
     """Why the model is not the controller's."""
+
+    def counted(self, health: int | None) -> list[tuple[int, int]]:
+        """Tick and TxDropped of each CanopyHealth, whose key is given."""
+        frames = self.sent.get(health, []) if health is not None else []
+        return [(sent.tick, int.from_bytes(sent.data[4:6], "little")) for sent in frames]
 
 
 @dataclass
@@ -173,7 +193,18 @@ class _Reader:
         for run in self.recording.runs:
             if run.ticks and _lacks(run.ticks) is not None:
                 run.ticks.pop()
+            self._end_at_hole(run)
         return self.recording
+
+    def _end_at_hole(self, run: Run) -> None:
+        """A run ends where more trace frames are missing than the controller has counted as dropped."""
+        left = max((dropped for _, dropped in run.counted(self._bus.health)), default=0)
+        for hole in run.holes:
+            left -= hole.frames
+            if left < 0:
+                run.gap = hole.text
+                del run.ticks[hole.tick :]
+                return
 
     def _take_received(self, message: can.Message, place: int, known: DbcMessage) -> None:
         try:
@@ -198,8 +229,8 @@ class _Reader:
         if self._run is None:
             self._commands.clear()
             return
-        if kind in _NUMBERED and not self._follows(kind, place, data):
-            return
+        if kind in _NUMBERED:
+            self._follow(kind, place, data)
         if kind == "CanopyTick" and not self._add_tick(place, data):
             return
         if kind in ("CanopyInputs", "CanopyArrivals") and not self._complete_tick(kind, place, data):
@@ -219,12 +250,14 @@ class _Reader:
         run.doubtful = {number: len(frames[-AHEAD:]) - 1 for number, frames in commands.items()}
         self._commands = sorted(command for frames in commands.values() for command in frames[-AHEAD:])
 
-    def _follows(self, kind: str, place: int, data: bytes) -> bool:
+    def _follow(self, kind: str, place: int, data: bytes) -> None:
+        """Notes what is missing; where a whole tick is, the next CanopyTick or CanopyInputs shows it."""
+        assert self._run is not None
         missing = (data[0] - self._sequence) % 256
         self._sequence = (data[0] + 1) % 256
-        if missing:
-            self._break(f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256")
-        return not missing
+        if missing and self._run.ticks:
+            text = f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256"
+            self._run.holes.append(Hole(len(self._run.ticks) - 1, missing, text))
 
     def _add_tick(self, place: int, data: bytes) -> bool:
         assert self._run is not None
