@@ -34,9 +34,18 @@ static const scenario_t scenarios[] = {
     {.name = "fifos", .options = {.controller = &deep, .fifos = 2, .polled = true, .peer_period = 10 * NS_PER_MS}},
     {.name = "backlog", .options = {.rx_max = 2, .peer_period = 47 * NS_PER_MS}},
     {.name = "loaded",
-     .options = {.mailboxes = 1, .cannot_abort = true, .traffic = {.per_mille = 950, .burst = 60, .highest_id = 0xFF}}},
+     .options = {.mailboxes = 1, .cannot_abort = true, .traffic = {.per_mille = 850, .burst = 40, .highest_id = 0xFF}}},
+    {.name = "overloaded",
+     .options = {.mailboxes = 1,
+                 .cannot_abort = true,
+                 .traffic = {.per_mille = 900, .burst = 120, .highest_id = 0xFF}}},
     {.name = "replaced", .fault = CABLE_OUT, .first_ms = 390, .length_ms = 70, .pause_ms = 430},
-    {.name = "one_mailbox", .options = {.mailboxes = 1}, .fault = CABLE_OUT, .first_ms = 390, .length_ms = 70, .pause_ms = 430},
+    {.name = "one_mailbox",
+     .options = {.mailboxes = 1},
+     .fault = CABLE_OUT,
+     .first_ms = 390,
+     .length_ms = 70,
+     .pause_ms = 430},
     {.name = "no_abort",
      .options = {.mailboxes = 1, .cannot_abort = true},
      .fault = CABLE_OUT,
@@ -69,8 +78,8 @@ static void write_frame(void *context, const canopy_can_frame_t *frame, const co
     (void)context;
     (void)from;
     (void)start;
-    (void)fprintf(output, "(%" PRIu64 ".%06" PRIu64 ") can0 %03" PRIX32 "#", end / NS_PER_S,
-                  end % NS_PER_S / NS_PER_US, frame->id);
+    (void)fprintf(output, "(%" PRIu64 ".%06" PRIu64 ") can0 %03" PRIX32 "#", end / NS_PER_S, end % NS_PER_S / NS_PER_US,
+                  frame->id);
     for (uint8_t byte = 0; byte < frame->length; byte++) {
         (void)fprintf(output, "%02X", frame->data[byte]);
     }

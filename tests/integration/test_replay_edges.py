@@ -17,9 +17,11 @@ from integration import logs
 from integration.test_replay import (
     ARRIVALS,
     BATTERY,
+    CHANGE,
     HEALTH,
     POSTURE_COMMAND,
     POWER_COMMAND,
+    SNAPSHOT,
     TICK,
     Log,
     differs,
@@ -224,6 +226,15 @@ def test_health_and_model_may_be_dropped_too(replay: Callable[..., Result], log:
     left = drop(log, places_of(log, HEALTH, {100}), counted=0)
     (found,) = differs(replay(left, "--json"), 100)
     assert found["message"] == "CanopyHealth"
+
+
+def test_changes_and_snapshots_may_be_dropped_too(replay: Callable[..., Result], log: Log) -> None:
+    """What a replay needs is there. More than was counted is a gap."""
+    change = next(i for i, m in enumerate(log) if m.arbitration_id == CHANGE and tick_of(log, i) > 110)
+    places = places_of(log, SNAPSHOT, {50, 51, 99, 180}) | {change}
+    data = is_equal(replay(drop(log, places), "--json"))
+    assert (data["ticks"], data["dropped"]) == (TICKS, 5)
+    refused(replay(drop(log, places, counted=2)), "1 trace frames are missing, or 1 more than 256", "--ticks 99")
 
 
 @pytest.mark.parametrize("ticks", [1, 2, 4])

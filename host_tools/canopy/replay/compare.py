@@ -75,7 +75,7 @@ class Comparison:
         self._ticks = ticks
         self._whole = ticks - 1 if run.gap is None and ticks == len(run.ticks) else ticks
         """Of so many ticks the log has everything: it may end within the last one."""
-        self._counted = run.counted(bus.health)
+        self._counted = run.counted
         self._found: list[tuple[int, Difference]] = []
         """With its place in the replay."""
 
@@ -112,8 +112,8 @@ class Comparison:
         for order, message in enumerate(frames):
             number = key(message.arbitration_id, message.is_extended_id)
             done += self._bus.trace.get(number) == "CanopyTick"
-            # A command is sent before its tick's CanopyTick. At its end the program sends safe commands: those of no tick,
-            # which may have replaced the last tick's before they left.
+            # A command is sent before its tick's CanopyTick. Those at the program's end are of no tick, and may have
+            # replaced those of the last tick before they left.
             tick = done - 1 if number in self._bus.trace else done
             if tick <= self._ticks:
                 result.setdefault(number, []).append(Replayed(order, tick, bytes(message.data)))

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from canopy.replay.log import LogError, Recording, Run, Taken
-from canopy.replay.ticks import Tick, next_check
+from canopy.replay.ticks import CHECKED_CONDITIONS, Tick, next_check
 
 _AHEAD = 64
 """On a unixbus a frame may reach the log that much later than the controller's answer to it."""
@@ -54,6 +54,8 @@ class Inputs:
         """Of each tick the ages of the messages of which it has taken frames [ms], by their key."""
         self.reordered = 0
         """How often two frames of different senders had to change places: a unixbus has not one order for all."""
+        self.unheard = 0
+        """Frames of the log that never reached the controller, which was off the bus or overloaded, and said so."""
         self._path = recording.path
         self._run = run
         self._received = list(recording.received)
@@ -106,7 +108,7 @@ class Inputs:
         """Goes on behind so many steps that fit, and mends what can be mended. Else all is as before."""
         before = list(self._received), list(self._steps), list(self._counts)
         place = start + sum(step.frames for step in self._steps[:steps])
-        self.reordered = 0
+        self.reordered = self.unheard = 0
         for index in range(steps, len(self._steps)):
             if self._is_cut(index, place):
                 break
@@ -160,7 +162,8 @@ class Inputs:
     def _mend(self, index: int, place: int) -> bool:
         """Finds what fits after all, and some further steps with it.
 
-        That may be more frames than Taken can tell, or two neighbours of different senders that change places.
+        That may be more frames than Taken can tell, two neighbours of different senders that change places, or frames
+        that never reached the controller.
         """
         step = self._steps[index]
         most = min(_FRAMES_MAX, len(self._received) - place)
@@ -178,6 +181,25 @@ class Inputs:
                     self.reordered += 1
                     return True
                 self._received[first : first + 2] = a, b
+        return self._has_told_losses(index) and self._skip(index, place)
+
+    def _has_told_losses(self, index: int) -> bool:
+        """Was the bus not as it should be in the tick, or in one since the last that took frames?"""
+        first = self._steps[index - 1].tick + 1 if index else 0
+        return any(
+            tick.conditions & CHECKED_CONDITIONS for tick in self._run.ticks[first : self._steps[index].tick + 1]
+        )
+
+    def _skip(self, index: int, place: int) -> bool:
+        """Leaves out frames that never reached the controller, where then this step and some further ones fit."""
+        received = self._received
+        for lost in range(1, _LOST_MAX + 1):
+            for first in range(place, place + self._steps[index].frames):
+                self._received = received[:first] + received[first + lost :]
+                if self._is_sure(index, place, 2 * _SURE_FRAMES):
+                    self.unheard += lost
+                    return True
+        self._received = received
         return False
 
     def _is_sure(self, index: int, place: int, wanted: int) -> bool:

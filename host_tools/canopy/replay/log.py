@@ -60,8 +60,6 @@ class Bus:
         """Which kind a trace message is."""
         self.protected: dict[int, int] = {}
         """The E2E data ids of protected commands."""
-        self.health: int | None = None
-        """Key of CanopyHealth; None: it is not there."""
         for need in NEEDED:
             if need not in model.trace:
                 raise ModelError(
@@ -73,7 +71,6 @@ class Bus:
             kind = message.name.partition("_")[0]
             if model.trace.get(kind) == message.frame_id and model.bus_node in message.senders:
                 self.trace[number] = kind
-                self.health = number if kind == "CanopyHealth" else self.health
                 self.sent[number] = message
             elif message.name in model.send:
                 self.sent[number] = message
@@ -140,10 +137,8 @@ class Run:
     mismatch: str | None = None
     """Why the model is not the controller's."""
 
-    def counted(self, health: int | None) -> list[tuple[int, int]]:
-        """Tick and TxDropped of each CanopyHealth, whose key is given."""
-        frames = self.sent.get(health, []) if health is not None else []
-        return [(sent.tick, int.from_bytes(sent.data[4:6], "little")) for sent in frames]
+    counted: list[tuple[int, int]] = field(default_factory=list)
+    """Tick and TxDropped of each CanopyHealth, also behind a gap."""
 
 
 @dataclass
@@ -198,7 +193,7 @@ class _Reader:
 
     def _end_at_hole(self, run: Run) -> None:
         """A run ends where more trace frames are missing than the controller has counted as dropped."""
-        left = max((dropped for _, dropped in run.counted(self._bus.health)), default=0)
+        left = max((dropped for _, dropped in run.counted), default=0)
         for hole in run.holes:
             left -= hole.frames
             if left < 0:
@@ -226,6 +221,9 @@ class _Reader:
                 self._begin()
             elif self.recording.joined is None and not self.recording.runs:
                 self.recording.joined = tick
+        if kind == "CanopyHealth" and self.recording.runs:
+            run = self.recording.runs[-1]
+            run.counted.append((len(run.ticks) - 1, int.from_bytes(data[4:6], "little")))
         if self._run is None:
             self._commands.clear()
             return
