@@ -206,14 +206,14 @@ static void test_nothing_but_the_data_reaches_the_bus(void)
     frame.length = 2;
     frame.data[0] = 0x11;
     frame.data[1] = 0x22;
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     const int peer = bare_socket("1-00c0ffee.sock");
-    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(sizeof data, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(data, bytes, sizeof data);
     frame.flags = CANOPY_CAN_REMOTE;
     frame.length = 8;
-    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(sizeof remote, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(remote, bytes, sizeof remote);
     (void)close(peer);
