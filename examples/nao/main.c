@@ -40,24 +40,24 @@ static options_t options;
 
 static void print_help(FILE *file)
 {
-    fprintf(file,
-            "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
-            "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
-            "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
-            "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
-            "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
-            "  --ticks N     end after N ticks\n"
-            "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
-            "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
-            "  --quiet       no summary at the end\n"
-            "  --help        this text\n\n"
-            "Examples:\n"
-            "  %s --can socketcan:vcan0\n"
-            "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
-            "  gdb --args %s --replay run.replay\n\n"
-            "Exit status: 0 ended as asked, the safe values are out; 1 the bus or a file failed; 2 wrong command line.\n",
-            CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name,
-            CANOPY_APP.name);
+    fprintf(
+        file,
+        "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
+        "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
+        "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
+        "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
+        "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
+        "  --ticks N     end after N ticks\n"
+        "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
+        "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
+        "  --quiet       no summary at the end\n"
+        "  --help        this text\n\n"
+        "Examples:\n"
+        "  %s --can socketcan:vcan0\n"
+        "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
+        "  gdb --args %s --replay run.replay\n\n"
+        "Exit status: 0 ended as asked, the safe values are out; 1 the bus or a file failed; 2 wrong command line.\n",
+        CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.name);
 }
 
 static uint32_t parse_ticks(const char *text)
@@ -163,11 +163,18 @@ static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
                                          [CANOPY_CAN_DOWN] = "down",
                                          [CANOPY_CAN_GONE] = "gone"};
 
+    static bool was_unusable;
+    bool is_unusable = canopy_can_is_unusable((canopy_can_state_t)detail);
+
     (void)context;
-    if (fault == CANOPY_FAULT_CAN_STATE && options.replay == NULL) {
-        fprintf(stderr, "%s: %s: the bus is %s\n", CANOPY_APP.name, options.can, states[detail]);
+    if (fault != CANOPY_FAULT_CAN_STATE || options.replay != NULL) {
+        return;
+    }
+    fprintf(stderr, "%s: %s: the bus is %s\n", CANOPY_APP.name, options.can, states[detail]);
+    if (is_unusable != was_unusable) { /* what it can promise may be something else now */
         print_advice();
     }
+    was_unusable = is_unusable;
 }
 
 static void print_summary(const canopy_can_t *can)
@@ -202,8 +209,7 @@ static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
     if (options.replay != NULL) {
         config->can = &replay.replay.can;
         config->clock = &replay.replay.clock;
-        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace, message, size) ==
-               CANOPY_OK;
+        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace, message, size) == CANOPY_OK;
     }
     if (options.lock_step) {
         with_step.next = acceptance;

@@ -52,7 +52,8 @@ canopy_can_state_t canopy_can_manager_step(canopy_can_manager_t *self, const can
 {
     canopy_can_state_t before = self->state;
 
-    self->state = look(can, blocked);
+    /* What could not be handed over while the bus was unusable says nothing of the bus that has just come back. */
+    self->state = look(can, blocked && !canopy_can_is_unusable(before));
     if (canopy_can_is_unusable(self->state) != canopy_can_is_unusable(before)) {
         self->since = now;
     }

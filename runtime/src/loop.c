@@ -124,14 +124,16 @@ static bool has_lost(canopy_loop_t *self)
 static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
 {
     canopy_tx_counters_t counters;
+    uint32_t late;
 
     if (self->can_manager.state != before) {
         report(self, CANOPY_FAULT_CAN_STATE, (uint32_t)self->can_manager.state);
     }
     canopy_tx_count(self->config->app->tx, &counters);
-    if (counters.expired != self->tx_expired) {
-        report(self, CANOPY_FAULT_TX_EXPIRED, counters.expired - self->tx_expired);
-        self->tx_expired = counters.expired;
+    late = canopy_sum(counters.expired, counters.replaced); /* a value that is replaced was not out in its cycle */
+    if (late != self->tx_expired) {
+        report(self, CANOPY_FAULT_TX_EXPIRED, late - self->tx_expired);
+        self->tx_expired = late;
     }
 }
 

@@ -50,7 +50,8 @@ static void print_counters(void)
 
     canopy_tx_count(&tx, &counters);
     port.can->stats(port.can->context, &stats);
-    printf("sent=%" PRIu32 " replaced=%" PRIu32 " expired=%" PRIu32 " driver_sent=%" PRIu32 " driver_dropped=%" PRIu32 "\n",
+    printf("sent=%" PRIu32 " replaced=%" PRIu32 " expired=%" PRIu32 " driver_sent=%" PRIu32 " driver_dropped=%" PRIu32
+           "\n",
            counters.sent, counters.replaced, counters.expired, stats.sent, stats.tx_dropped);
 }
 
@@ -68,8 +69,7 @@ static void run(canopy_time_t period)
 
         output.ms = (uint32_t)(now / 1000u);
         output.tick++;
-        while (port.can->receive(port.can->context, &frame) == 1) {
-        }
+        while (port.can->receive(port.can->context, &frame) == 1) {}
         if (canopy_can_manager_step(&manager, port.can, canopy_tx_is_blocked(&tx), now) != before) {
             before = manager.state;
             printf("state %d\n", (int)before);

@@ -30,8 +30,7 @@ void tearDown(void)
 /** A look that ends at `now`, whose clocks are read `length` apart, with the wall clock in the middle. */
 static void look(int64_t now, int64_t offset, int64_t length)
 {
-    const canopy_arrival_clocks_t clocks = {
-        .before = now - length, .real = now - length / 2 + offset, .after = now};
+    const canopy_arrival_clocks_t clocks = {.before = now - length, .real = now - length / 2 + offset, .after = now};
 
     canopy_arrival_look(&arrival, &clocks);
 }

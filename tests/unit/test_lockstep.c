@@ -23,8 +23,8 @@ static struct {
     int wait_result;  /* of a wait without frames */
     canopy_can_frame_t sent;
     unsigned sends;
-    int busy_sends; /* so many more find no room */
-    int pending;    /* so often more a frame is not out yet; -1: it never will be */
+    int busy_sends;           /* so many more find no room */
+    int pending;              /* so often more a frame is not out yet; -1: it never will be */
     canopy_can_outcome_t end; /* what becomes of it */
     unsigned aborts;
     unsigned restarts;

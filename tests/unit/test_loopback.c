@@ -131,10 +131,14 @@ static void test_join_refuses_bad_arguments(void)
 {
     static const canopy_can_acceptance_t bad = {.ids = NULL, .count = 1};
 
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(NULL, &c, storage[2], CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, NULL, storage[2], CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, &c, NULL, CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, &c, storage[2], 3, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_loopback_join(NULL, &c, storage[2], CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_loopback_join(&bus, NULL, storage[2], CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_loopback_join(&bus, &c, NULL, CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_loopback_join(&bus, &c, storage[2], 3, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, &c, storage[2], CAPACITY, &bad));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loopback_join(&bus, &c, storage[2], CAPACITY, NULL));
 }

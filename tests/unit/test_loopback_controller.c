@@ -89,8 +89,8 @@ static canopy_can_t controller;
 
 static void join(canopy_loopback_endpoint_t *endpoint, unsigned place)
 {
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, endpoint, storage[place], CAPACITY,
-                                                      CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_loopback_join(&bus, endpoint, storage[place], CAPACITY, CANOPY_CAN_ACCEPT_EVERYTHING));
 }
 
 static void start(uint8_t mailboxes)
@@ -238,7 +238,7 @@ static void test_a_less_urgent_frame_gives_up_its_mailbox_and_waits_again(void)
     TEST_ASSERT_EQUAL_UINT(1, hardware.aborts);
     TEST_ASSERT_EQUAL_HEX32(0x100, on_wire(0));
     TEST_ASSERT_EQUAL(CANOPY_CAN_PENDING, outcome(&a)); /* a does not know */
-    TEST_ASSERT_EQUAL(1, send(&c, 0x200)); /* less urgent than b's: it waits */
+    TEST_ASSERT_EQUAL(1, send(&c, 0x200));              /* less urgent than b's: it waits */
     TEST_ASSERT_EQUAL_UINT(1, hardware.aborts);
     let_out(0);
     TEST_ASSERT_EQUAL(CANOPY_CAN_SENT, outcome(&b));

@@ -84,9 +84,8 @@ static void put_sensor(uint8_t value)
 
 static void put_arrivals(uint8_t conditions, uint16_t age_ms)
 {
-    put((canopy_can_frame_t){.id = ARRIVALS_ID,
-                             .length = 8,
-                             .data = {conditions, (uint8_t)(age_ms & 0xFFu), (uint8_t)(age_ms >> 8)}});
+    put((canopy_can_frame_t){
+        .id = ARRIVALS_ID, .length = 8, .data = {conditions, (uint8_t)(age_ms & 0xFFu), (uint8_t)(age_ms >> 8)}});
 }
 
 static canopy_time_t now(void)
@@ -369,8 +368,7 @@ static unsigned record_the_mission(void)
     unsigned kept = 0;
 
     TEST_ASSERT_EQUAL(CANOPY_OK, nao_in_process_init(&run, &nao_home_app));
-    TEST_ASSERT_EQUAL(CANOPY_OK,
-                      canopy_loopback_join(&run.bus, &ear, queue, 32, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&run.bus, &ear, queue, 32, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, 500, 0));
     run.now = UINT64_C(123456789);
     for (unsigned tick = 0; tick < (unsigned)TICKS; tick++) {

@@ -102,8 +102,8 @@ static uint16_t tidy(canopy_can_mask_t *masks, uint16_t count)
 {
     for (uint16_t a = 0; a < count; a++) {
         for (uint16_t b = 0; b < count; b++) {
-            bool within = a != b && (masks[b].mask & ~masks[a].mask) == 0u &&
-                          ((masks[a].id ^ masks[b].id) & masks[b].mask) == 0u;
+            bool within =
+                a != b && (masks[b].mask & ~masks[a].mask) == 0u && ((masks[a].id ^ masks[b].id) & masks[b].mask) == 0u;
 
             if (within) {
                 masks[a--] = masks[--count]; /* looked at next */

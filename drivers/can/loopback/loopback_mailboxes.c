@@ -19,8 +19,7 @@ static uint8_t mailbox_count(const canopy_can_t *controller)
     if (controller->outcome == NULL || controller->mailboxes == 0u) {
         return 1;
     }
-    return controller->mailboxes < CANOPY_CAN_MAILBOXES_MAX ? controller->mailboxes
-                                                            : (uint8_t)CANOPY_CAN_MAILBOXES_MAX;
+    return controller->mailboxes < CANOPY_CAN_MAILBOXES_MAX ? controller->mailboxes : (uint8_t)CANOPY_CAN_MAILBOXES_MAX;
 }
 
 /** Takes note of what became of a mailbox's frame. @return true: the mailbox is free. */

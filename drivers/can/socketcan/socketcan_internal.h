@@ -41,10 +41,10 @@ void canopy_socketcan_restart(void *context);
 
 /** What the kernel says of an interface. */
 typedef struct {
-    bool has_echo;         /**< IFF_ECHO */
-    bool has_queue;        /**< Frames may wait in the kernel. */
-    bool is_controller;    /**< It has the attributes of a CAN controller. */
-    bool restarts_itself;  /**< restart-ms is not 0. */
+    bool has_echo;                      /**< IFF_ECHO */
+    bool has_queue;                     /**< Frames may wait in the kernel. */
+    bool is_controller;                 /**< It has the attributes of a CAN controller. */
+    bool restarts_itself;               /**< restart-ms is not 0. */
     canopy_can_controller_t controller; /**< Error state. */
 } canopy_socketcan_link_t;
 

@@ -113,7 +113,8 @@ static void read_info(canopy_socketcan_link_t *link, const attribute_t *outer)
 static void read_link(canopy_socketcan_link_t *link, const struct nlmsghdr *answer)
 {
     const struct ifinfomsg *info = NLMSG_DATA(answer);
-    attributes_t attributes = {.next = (const char *)IFLA_RTA(info), .left = answer->nlmsg_len - NLMSG_LENGTH(sizeof *info)};
+    attributes_t attributes = {.next = (const char *)IFLA_RTA(info),
+                               .left = answer->nlmsg_len - NLMSG_LENGTH(sizeof *info)};
     const attribute_t *part;
 
     *link = (canopy_socketcan_link_t){.has_echo = (info->ifi_flags & FLAG_ECHO) != 0u, .has_queue = true};
@@ -148,8 +149,7 @@ bool canopy_socketcan_ask_link(unsigned index, canopy_socketcan_link_t *link)
     }
     (void)close(socket_number);
     if (size < (ssize_t)NLMSG_LENGTH(sizeof(struct ifinfomsg)) || answer.header.nlmsg_type != RTM_NEWLINK ||
-        answer.header.nlmsg_len > (size_t)size ||
-        answer.header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
+        answer.header.nlmsg_len > (size_t)size || answer.header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
         return false;
     }
     read_link(link, &answer.header);

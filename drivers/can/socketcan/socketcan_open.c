@@ -161,8 +161,8 @@ void canopy_socketcan_learn(canopy_socketcan_t *self)
 static void start(canopy_socketcan_t *self, unsigned index)
 {
     self->index = index;
-    self->link = CANOPY_CAN_CONTROLLER_ACTIVE;
-    canopy_socketcan_learn(self);
+    self->link = CANOPY_CAN_CONTROLLER_DOWN; /* until the first look, which learns what it is */
+    self->knowledge = CANOPY_SOCKETCAN_BY_QUEUE;
     self->next_look = 0;
     self->dropped_before = self->stats.rx_dropped;
     canopy_socketcan_lose_flight(self);
@@ -229,12 +229,14 @@ const char *canopy_socketcan_advice(const canopy_socketcan_t *self, unsigned num
     if (self->link != CANOPY_CAN_CONTROLLER_ACTIVE) { /* and what it is, nobody can know yet */
         texts[count++] = "the interface is down: nothing is sent or received until `ip link set INTERFACE up`";
     } else if (self->knowledge == CANOPY_SOCKETCAN_BY_QUEUE) {
-        texts[count++] = "the interface does not tell when a frame is out (no IFF_ECHO): when the bus is blocked, one frame in "
-                         "the kernel's queue and those in the adapter leave after their deadline; use an adapter that echoes";
+        texts[count++] =
+            "the interface does not tell when a frame is out (no IFF_ECHO): when the bus is blocked, one frame in "
+            "the kernel's queue and those in the adapter leave after their deadline; use an adapter that echoes";
     }
     if (self->is_controller && !self->restarts_itself && !self->may_switch) {
-        texts[count++] = "after bus-off nobody restarts the controller: `ip link set INTERFACE type can restart-ms 100`, or "
-                         "give the program CAP_NET_ADMIN";
+        texts[count++] =
+            "after bus-off nobody restarts the controller: `ip link set INTERFACE type can restart-ms 100`, or "
+            "give the program CAP_NET_ADMIN";
     }
     return number < count ? texts[number] : NULL;
 }

@@ -23,7 +23,7 @@ static canopy_can_controller_t state_by_counters(const uint8_t *data)
     return most >= (uint8_t)COUNTER_WARNING ? CANOPY_CAN_CONTROLLER_WARNING : CANOPY_CAN_CONTROLLER_ACTIVE;
 }
 
-#define STATES                                                                                              \
+#define STATES                                                                                               \
     (CAN_ERR_CRTL_TX_PASSIVE | CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_RX_WARNING | \
      CAN_ERR_CRTL_ACTIVE)
 
@@ -40,7 +40,8 @@ static canopy_can_controller_t state_by_status(uint8_t status)
 
 static void take_error(canopy_socketcan_t *self, const struct canfd_frame *raw)
 {
-    bool has_counters = (raw->can_id & ERROR_COUNTERS) != 0u || raw->data[TX_COUNTER] != 0 || raw->data[RX_COUNTER] != 0;
+    bool has_counters =
+        (raw->can_id & ERROR_COUNTERS) != 0u || raw->data[TX_COUNTER] != 0 || raw->data[RX_COUNTER] != 0;
 
     self->stats.error_frames++;
     if ((raw->can_id & CAN_ERR_BUSOFF) != 0u) {
@@ -135,9 +136,8 @@ void canopy_socketcan_restart(void *context)
         if (canopy_socketcan_bind(self) == CANOPY_OK) {
             self->next_look = 0;
         }
-    } else if (self->link == CANOPY_CAN_CONTROLLER_ACTIVE &&
-               self->controller == CANOPY_CAN_CONTROLLER_BUS_OFF && !self->restarts_itself &&
-               canopy_socketcan_switch(self)) {
+    } else if (self->link == CANOPY_CAN_CONTROLLER_ACTIVE && self->controller == CANOPY_CAN_CONTROLLER_BUS_OFF &&
+               !self->restarts_itself && canopy_socketcan_switch(self)) {
         canopy_socketcan_lose_flight(self);
         self->controller = CANOPY_CAN_CONTROLLER_ACTIVE;
     }

@@ -79,7 +79,8 @@ static ssize_t take_next(canopy_unixbus_t *self)
 
     canopy_arrival_look(&self->arrival, &clocks);
     if (size > 0 || (size == 0 && stamp_of(&message) != 0)) { /* else the socket was shut down */
-        take_datagram(self, datagram, (size_t)size, canopy_arrival_of(&self->arrival, stamp_of(&message), clocks.after));
+        take_datagram(self, datagram, (size_t)size,
+                      canopy_arrival_of(&self->arrival, stamp_of(&message), clocks.after));
     } else if (size < 0 && number == EAGAIN) {
         self->arrival.empty_at = before;
     }
@@ -228,7 +229,7 @@ static canopy_can_controller_t unixbus_state(void *context)
     canopy_unixbus_t *self = context;
 
     return canopy_unixbus_folder_refresh(&self->folder) == CANOPY_OK ? CANOPY_CAN_CONTROLLER_ACTIVE
-                                                                      : CANOPY_CAN_CONTROLLER_GONE;
+                                                                     : CANOPY_CAN_CONTROLLER_GONE;
 }
 
 static void unixbus_stats(void *context, canopy_can_stats_t *stats)

@@ -136,17 +136,17 @@ canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_
     if (trace->inputs.id == CANOPY_TRACE_OFF || trace->arrivals.id == CANOPY_TRACE_OFF) {
         return CANOPY_ERROR_UNSUPPORTED;
     }
-    *self = (canopy_replay_t){
-        .can = {.context = self,
-                .receive = replay_receive,
-                .send = replay_send,
-                .conditions = replay_conditions,
-                .stats = replay_stats,
-                .mailboxes = 1},
-        .clock = {.context = self, .now = replay_now, .wait_until = replay_wait_until},
-        .io = *io,
-        .inputs = trace->inputs,
-        .arrivals = trace->arrivals};
+    *self = (canopy_replay_t){.can = {.context = self,
+                                      .receive = replay_receive,
+                                      .send = replay_send,
+                                      .conditions = replay_conditions,
+                                      .stats = replay_stats,
+                                      .mailboxes = 1,
+                                      .is_filtered = true},
+                              .clock = {.context = self, .now = replay_now, .wait_until = replay_wait_until},
+                              .io = *io,
+                              .inputs = trace->inputs,
+                              .arrivals = trace->arrivals};
     read_next(self);
     if (self->error != CANOPY_OK) {
         return self->error;

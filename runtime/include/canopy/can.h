@@ -148,13 +148,13 @@ typedef struct {
  * @param stamp     the timer when the frame arrived; less than one turn of the timer ago
  * @param bits      width of the timer, 1..32; not checked
  * @param tick_ns   length of one count [ns]
- * @return the time of arrival [us], rounded down: a frame never looks younger than it is. O(1).
+ * @return the time of arrival [us], or up to a count earlier: a frame never looks younger than it is. O(1).
  */
 static inline canopy_time_t canopy_time_of_stamp(canopy_time_t now, uint32_t timer, uint32_t stamp, unsigned bits,
                                                  uint32_t tick_ns)
 {
     const uint32_t mask = UINT32_MAX >> (32u - bits);
-    const uint64_t ago_ns = (uint64_t)((timer - stamp) & mask) * tick_ns;
+    const uint64_t ago_ns = ((uint64_t)((timer - stamp) & mask) + 1u) * tick_ns; /* whole counts: up to one more */
 
     return now - (ago_ns + 999u) / 1000u;
 }

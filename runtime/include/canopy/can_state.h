@@ -52,7 +52,7 @@ static inline bool canopy_can_is_unusable(canopy_can_state_t state)
 
 /**
  * One step, in each cycle: asks the driver, restarts where it is time.
- * @param blocked canopy_tx_is_blocked()
+ * @param blocked canopy_tx_is_blocked(); not looked at in the first step after an unusable bus
  * @return the state. O(1).
  */
 canopy_can_state_t canopy_can_manager_step(canopy_can_manager_t *self, const canopy_can_t *can, bool blocked,

@@ -58,7 +58,7 @@ typedef struct {
     bool fd_frames;   /**< The interface carries CAN FD (its MTU when it was opened). Else FD frames are refused. */
     int socket;       /**< File descriptor, e.g. for poll() with others; -1 when closed. */
     canopy_socketcan_knowledge_t knowledge; /**< How the driver knows that a frame is out. */
-    int events;       /* a second socket: error frames, and the echo of what is sent; -1 when closed */
+    int events; /* a second socket: error frames, and the echo of what is sent; -1 when closed */
     char name[16];
     unsigned index; /* of the interface that the sockets are bound to */
     const canopy_can_acceptance_t *acceptance;

@@ -60,7 +60,7 @@ typedef struct {
     uint32_t step_id;
     canopy_time_t now;
     bool in_flight; /* a frame is with the inner driver */
-    bool joined; /* `last` holds the last step frame */
+    bool joined;    /* `last` holds the last step frame */
     canopy_can_frame_t last;
     uint32_t received;
     uint32_t overwritten;
