@@ -6,13 +6,19 @@
 
 #define MS UINT32_C(1000) /* [us] */
 
-/** Order of the table: standard ids before extended ones. The driver's error frames are behind all: no message is one. */
-static uint32_t rank(uint32_t id, uint8_t flags)
+/** Order of the table: standard ids before extended ones. */
+static uint32_t rank(const canopy_rx_message_t *message)
 {
-    uint32_t extended = (flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
-    uint32_t error = (flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
+    return message->id | ((message->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u);
+}
 
-    return id | extended | error;
+/** The rank that a message must have to be this frame. The driver's error frames are behind all: no message is one. */
+static uint32_t rank_of(const canopy_can_frame_t *frame)
+{
+    uint32_t extended = (frame->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
+    uint32_t error = (frame->flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
+
+    return frame->id | extended | error;
 }
 
 static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
@@ -23,13 +29,13 @@ static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
     while (low < high) {
         uint16_t middle = (uint16_t)((low + high) / 2u);
 
-        if (rank(bus->rx[middle].id, bus->rx[middle].flags) < wanted) {
+        if (rank(&bus->rx[middle]) < wanted) {
             low = (uint16_t)(middle + 1u);
         } else {
             high = middle;
         }
     }
-    if (low < bus->rx_count && rank(bus->rx[low].id, bus->rx[low].flags) == wanted) {
+    if (low < bus->rx_count && rank(&bus->rx[low]) == wanted) {
         return low;
     }
     return bus->rx_count;
@@ -75,7 +81,7 @@ static void note_arrival(canopy_rx_state_t *state, const canopy_rx_message_t *me
 
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
 {
-    uint16_t index = find(self->bus, rank(frame->id, frame->flags));
+    uint16_t index = find(self->bus, rank_of(frame));
     const canopy_rx_message_t *message;
     canopy_rx_state_t *state;
 

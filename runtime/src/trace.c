@@ -76,8 +76,7 @@ static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_stat
                           const canopy_trace_tick_t *tick)
 {
     const canopy_bus_state_t *bus = tick->bus;
-    unsigned conditions = (unsigned)tick->cycle->can_state |
-                          (tick->cycle->overload ? (unsigned)OVERLOAD_BIT : 0u) |
+    unsigned conditions = (unsigned)tick->cycle->can_state | (tick->cycle->overload ? (unsigned)OVERLOAD_BIT : 0u) |
                           (tick->returning ? (unsigned)RETURNING_BIT : 0u);
     bool is_due = conditions != self->conditions;
     unsigned filled = 0;

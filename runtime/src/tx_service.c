@@ -98,7 +98,8 @@ static void set_flying(canopy_tx_t *self, const canopy_tx_mailbox_t *box, bool f
 }
 
 /** Takes note of what has become of the frame in a mailbox, which `box` describes. */
-static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_mailbox_t *box, canopy_time_t now)
+static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_mailbox_t *box,
+                                   canopy_time_t now)
 {
     const canopy_can_t *can = self->can;
     canopy_can_outcome_t outcome = can->outcome(can->context, mailbox);
@@ -272,25 +273,6 @@ static int send_commands(canopy_tx_t *self, canopy_time_t now)
     return 1;
 }
 
-/** The trace frame that is next; NULL: none waits, or one is in a mailbox. Those that are too late are dropped. */
-static const canopy_tx_trace_t *next_trace(canopy_tx_t *self, canopy_time_t now)
-{
-    const uint32_t head = atomic_load_explicit(&self->trace_head, memory_order_acquire);
-    uint32_t tail = atomic_load_explicit(&self->trace_tail, memory_order_relaxed);
-
-    while (!self->trace_flying && tail != head) {
-        const canopy_tx_trace_t *trace = &self->trace[tail & self->trace_mask];
-
-        if (!canopy_time_reached(now, trace->until)) {
-            return trace;
-        }
-        forget_trace(self);
-        add(&self->trace_late, 1u);
-        tail++;
-    }
-    return NULL;
-}
-
 /* By value and one by one: a compiler makes two words of it, where the core can read and write those anywhere. */
 static void copy_trace_data(uint8_t *to, canopy_tx_trace_data_t from)
 {
@@ -317,17 +299,29 @@ static int send_trace(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_trace_
     return load(self, mailbox, &frame, &box);
 }
 
-/** One after the other, so that they keep their order whatever the hardware does with several. @return as above. */
+/**
+ * Sends what waits, and drops what is too late. One after the other, so that they keep their order whatever the hardware
+ * does with several.
+ * @return as send_commands()
+ */
 static int send_traces(canopy_tx_t *self, canopy_time_t now)
 {
-    const canopy_tx_trace_t *trace;
+    const uint32_t head = atomic_load_explicit(&self->trace_head, memory_order_acquire);
+    uint32_t tail = atomic_load_explicit(&self->trace_tail, memory_order_relaxed);
+    uint8_t mailbox = tail != head ? find_mailbox(self, CANOPY_TX_TRACE, now) : (uint8_t)NO_MAILBOX;
 
-    while ((trace = next_trace(self, now)) != NULL) {
-        uint8_t mailbox = find_mailbox(self, CANOPY_TX_TRACE, now);
-        int result = mailbox != (uint8_t)NO_MAILBOX ? send_trace(self, mailbox, trace, now) : 0;
+    for (; tail != head && !self->trace_flying; tail++) {
+        const canopy_tx_trace_t *trace = &self->trace[tail & self->trace_mask];
 
-        if (result != 1) {
-            return result;
+        if (canopy_time_reached(now, trace->until)) {
+            forget_trace(self);
+            add(&self->trace_late, 1u);
+        } else {
+            int result = mailbox != (uint8_t)NO_MAILBOX ? send_trace(self, mailbox, trace, now) : 0;
+
+            if (result != 1) {
+                return result;
+            }
         }
     }
     return 1;
