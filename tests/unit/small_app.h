@@ -84,7 +84,7 @@ static const canopy_tx_message_t tx[TX] = {
      .data_id = CANOPY_E2E_NONE,
      .every = 4,
      .place = 2,
-     .deadline = 4 * PERIOD_US,
+     .deadline = 4u * (canopy_time_t)PERIOD_US,
      .encode = encode}};
 static const canopy_bus_t tables = {
     .rx = rx, .tx = tx, .rx_count = RX, .tx_count = TX, .reset_output = reset_output, .set_cycle = set_cycle};

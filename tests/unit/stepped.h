@@ -47,8 +47,9 @@ static struct {
 } shared[SHARED_MAX];
 static unsigned shared_count;
 
-/** Changes what is done, to see that the exploration would find it. A store: false leaves it out. */
-static bool (*change_store)(int thread, const volatile void *address, uint32_t value, memory_order *order);
+/** Changes what is done, to see that the exploration would find it. A store: true leaves it out. */
+static bool (*leave_out_store)(int thread, const volatile void *address, uint32_t value);
+static memory_order (*change_order)(int thread, const volatile void *address, memory_order order);
 static uint32_t (*change_load)(int thread, const volatile void *address, uint32_t value);
 
 /* --- steps ------------------------------------------------------------------------------------------------------------ */
@@ -98,9 +99,10 @@ static void stepped_store(volatile void *address, size_t size, uint32_t value, m
     thread_t *thread;
 
     step(address);
-    if (change_store != NULL && !change_store(running, address, value, &order)) {
+    if (leave_out_store != NULL && leave_out_store(running, address, value)) {
         return;
     }
+    order = change_order != NULL ? change_order(running, address, order) : order;
     if (running == OUTSIDE || model != STORE_BUFFERS || !is_shared(address)) {
         write_memory(&store);
         return;
@@ -237,7 +239,7 @@ static unsigned long explore(model_t which, void (*before)(void), void (*first)(
     return orders;
 }
 
-/* From here on the code's accesses are steps. */
+/* NOLINTBEGIN(readability-identifier-naming): from here on the code's accesses are steps. */
 #undef atomic_load
 #undef atomic_load_explicit
 #undef atomic_store
@@ -249,5 +251,6 @@ static unsigned long explore(model_t which, void (*before)(void), void (*first)(
     stepped_store((object), sizeof *(object), (uint32_t)(value), (order))
 #undef memcpy
 #define memcpy stepped_copy
+/* NOLINTEND(readability-identifier-naming) */
 
 #endif

@@ -96,7 +96,7 @@ static const canopy_tx_message_t tx[] = {
      .data_id = CANOPY_E2E_NONE,
      .every = 3,
      .place = 6,
-     .deadline = 3u * DEADLINE_US,
+     .deadline = 3u * (canopy_time_t)DEADLINE_US,
      .encode = encode_torque},
 };
 static const canopy_bus_t tables = {

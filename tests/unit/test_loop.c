@@ -356,9 +356,10 @@ static void lost_trace_frames_are_counted(void)
     canopy_tx_count(&tx, &counters);
     TEST_ASSERT_EQUAL_UINT32(1, counters.trace_dropped);
     TEST_ASSERT_EQUAL_UINT8(8, trace_state.sequence);
-    (void)canopy_loop_cycle(&loop, CANOPY_TRACE_PERIODS * PERIOD_US); /* the 8 are too late now; 4 more wait */
+    (void)canopy_loop_cycle(&loop,
+                            (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US); /* the 8 are too late now; 4 more wait */
     fake.tx_result = 1;
-    (void)canopy_loop_cycle(&loop, CANOPY_TRACE_PERIODS * PERIOD_US);
+    (void)canopy_loop_cycle(&loop, (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US);
     canopy_tx_count(&tx, &counters);
     TEST_ASSERT_EQUAL_UINT32(9, counters.trace_dropped);
     TEST_ASSERT_EQUAL_UINT32(fake.tx_count, counters.trace_sent);

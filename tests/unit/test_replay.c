@@ -350,7 +350,7 @@ static void run_mission(unsigned tick)
 {
     run.now += tick % 3u == 1u ? 777u : 0u;
     run.now += tick == 6u ? 600000u : 0u;
-    run.age = tick % 4u * 1300u;
+    run.age = (canopy_time_t)(tick % 4u) * 1300u;
     if (tick == 6u) {
         (void)canopy_loop_cycle(&run.loop, run.now); /* the robot is silent */
         run.now += 50000u;

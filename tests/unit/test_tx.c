@@ -258,7 +258,7 @@ static void expired_frames_use_up_no_number_either(void)
 {
     canopy_e2e_receiver_t receiver = {0};
 
-    for (unsigned round = 0; round < 40u; round++) {
+    for (canopy_time_t round = 0; round < 40u; round++) {
         post(URGENT, (uint8_t)round, round * 10u + 5u);
         canopy_tx_service(&tx, round * 10u);
         if (round % 9u == 0u) {

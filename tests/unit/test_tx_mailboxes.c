@@ -300,7 +300,7 @@ static void a_bus_that_lets_nothing_through_is_blocked_until_something_gets_out(
 /* Newer values must not hide it: each replaces the one before just before its deadline. */
 static void a_bus_is_blocked_however_often_the_frame_is_replaced(void)
 {
-    for (unsigned tick = 0; tick < 3u; tick++) {
+    for (canopy_time_t tick = 0; tick < 3u; tick++) {
         post(0, (uint8_t)tick, 100u * tick + 101u);
         canopy_tx_service(&tx, 100u * tick);
     }
@@ -313,7 +313,7 @@ static void a_bus_is_blocked_however_often_the_frame_is_replaced(void)
 static void a_driver_that_takes_nothing_is_a_blocked_bus_too(void)
 {
     boxes.result = 0;
-    for (unsigned tick = 0; tick < 3u; tick++) {
+    for (canopy_time_t tick = 0; tick < 3u; tick++) {
         TEST_ASSERT_FALSE(canopy_tx_is_blocked(&tx));
         post(0, (uint8_t)tick, 100u * tick + 150u);
         canopy_tx_service(&tx, 100u * tick);

@@ -9,6 +9,7 @@
 
 #include <stdatomic.h>
 
+/* NOLINTBEGIN(readability-identifier-naming): they are the standard's. */
 #undef atomic_load
 #undef atomic_store
 #define atomic_load(object) atomic_load_explicit((object), memory_order_relaxed)
@@ -16,5 +17,6 @@
 #define memory_order_acquire memory_order_relaxed
 #define memory_order_release memory_order_relaxed
 #define memory_order_seq_cst memory_order_relaxed
+/* NOLINTEND(readability-identifier-naming) */
 
 #endif
