@@ -2,9 +2,7 @@
 /** @file An application's loop on the double; the contract is in rig.h. */
 #include "rig.h"
 
-#include <inttypes.h>
 #include <stddef.h>
-#include <stdio.h>
 
 #include "unity.h"
 
@@ -104,11 +102,7 @@ void rig_init(rig_t *self, const rig_options_t *options)
                                           .on_fault = on_fault,
                                           .after_cycle = after_cycle};
     make_driver(self, options);
-    traffic.seed = traffic.seed != 0u ? traffic.seed : 20261130u;
-    if (traffic.per_mille != 0u || traffic.per_second != 0u) {
-        printf("others: %" PRIu32 " per mille, bursts of %" PRIu32 ", %" PRIu32 " frames/s, seed %" PRIu32 "\n",
-               traffic.per_mille, traffic.burst, traffic.per_second, traffic.seed);
-    }
+    traffic.seed = traffic.seed != 0u ? traffic.seed : RIG_SEED;
     traffic_init(&self->traffic, &self->wire, &traffic);
     peer_init(&self->peer, &self->wire, options->app,
               options->peer_period != 0u ? options->peer_period : options->app->period * NS_PER_US);

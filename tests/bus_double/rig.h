@@ -15,6 +15,7 @@
 #include "wire.h"
 
 #define RIG_BIT_RATE 500000u
+#define RIG_SEED 20261130u /**< Of the others' traffic, if the options have none. */
 
 /** What a rig is made of. All zero: one common controller with an interrupt, abort and filters; nobody else on the bus. */
 typedef struct {
@@ -59,7 +60,7 @@ typedef struct rig {
     void (*after)(struct rig *rig);                                                   /* a cycle */
 } rig_t;
 
-/** Sets all up; the application's loop, too. Prints the seed of the other traffic. */
+/** Sets all up; the application's loop, too. */
 void rig_init(rig_t *self, const rig_options_t *options);
 
 /** canopy_loop_run() up to a time, with the stop that ends it; then the wire runs on for 200 ms. @return as the loop. */

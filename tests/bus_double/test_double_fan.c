@@ -88,9 +88,9 @@ static void run(const char *what, rig_options_t options)
     rig.after = after;
     world_at(&rig.world, &cutter, rig.world.now + SECONDS * NS_PER_S + 50u * NS_PER_MS, cut, NULL);
     TEST_ASSERT_EQUAL(CANOPY_OK, rig_run(&rig, rig.world.now + (SECONDS + 2u) * NS_PER_S));
-    printf("%s: fresh in %" PRIu32 " of %" PRIu32 " ticks, at most %" PRIu32 " us old; overload in %" PRIu32
-           "; the fan stops %" PRIu64 " us after the last reading, if it still ran\n",
-           what, fresh, ticks, oldest_us, overloaded,
+    printf("%s, seed %" PRIu32 ": fresh in %" PRIu32 " of %" PRIu32 " ticks, at most %" PRIu32
+           " us old; overload in %" PRIu32 "; the fan stops %" PRIu64 " us after the last reading, if it still ran\n",
+           what, rig.traffic.config.seed, fresh, ticks, oldest_us, overloaded,
            stopped_at > rig.peer.last_on_wire ? (stopped_at - rig.peer.last_on_wire) / NS_PER_US : 0u);
     TEST_ASSERT_NOT_EQUAL_UINT64_MESSAGE(0, stopped_at, "the fan was never stopped");
     TEST_ASSERT_TRUE(stopped_at <= rig.peer.last_on_wire + (TIMEOUT_US + PERIOD_US + FRAME_US) * NS_PER_US);

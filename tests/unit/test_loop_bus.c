@@ -351,6 +351,20 @@ static void arrivals_tell_the_state_of_the_bus_when_it_has_changed(void)
     expect_sent(ARRIVALS_ID, active);
 }
 
+static void arrivals_tell_that_safe_values_went_out_instead_of_the_trees(void)
+{
+    static const uint8_t down[] = {0x40 | CANOPY_CAN_DOWN, 0, 0, 0, 0, 0, 0, 0};
+    static const uint8_t back[] = {CANOPY_CAN_ERROR_ACTIVE, 0, 0, 0, 0, 0, 0, 1};
+
+    trace.arrivals.id = ARRIVALS_ID;
+    fake.controller = CANOPY_CAN_CONTROLLER_DOWN;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, down);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, back);
+}
+
 static void health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter(void)
 {
     static const uint8_t open[] = {0, 0, 1, 0, 9, 0, 0, 0};
@@ -387,6 +401,7 @@ int main(void)
     RUN_TEST(arrivals_tell_the_age_of_each_message_of_which_a_frame_was_taken);
     RUN_TEST(arrivals_of_exactly_one_frame_are_one_frame);
     RUN_TEST(arrivals_tell_the_state_of_the_bus_when_it_has_changed);
+    RUN_TEST(arrivals_tell_that_safe_values_went_out_instead_of_the_trees);
     RUN_TEST(health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter);
     return UNITY_END();
 }
