@@ -146,7 +146,17 @@ class _Builder:
             ways = {SUCCESS: success, FAILURE: failure, RUNNING: running}
             self.vertices[first].jumps = {status: ways[status] for status in self.vertices[first].statuses}
             return Jump((0, 0), first)
-        return _WAYS[kind](self, node, success.halting(first, end), failure.halting(first, end))
+        return _WAYS[kind](self, node, self._halting(success, node), self._halting(failure, node))
+
+    def _halting(self, jump: Jump, node: Node) -> Jump:
+        """The jump, and what is RUNNING below the node is halted, too.
+
+        A node below which nothing can be RUNNING adds nothing: so all ranges of a jump lie in each other, and their
+        hull has no other leaf in it.
+        """
+        first, end = self._ranges[id(node)]
+        can_run = any(RUNNING in vertex.statuses for vertex in self.vertices[first:end])
+        return jump.halting(first, end) if can_run else jump
 
     def in_order(self, node: Node, success: Jump, failure: Jump) -> Jump:
         """ReactiveSequence and ReactiveFallback."""
@@ -161,8 +171,8 @@ class _Builder:
         yes = self._enter(node.children[1], success, failure)
         no = self._enter(node.children[2], success, failure) if len(node.children) == 3 else failure
         if len(node.children) == 3:
-            yes = yes.halting(*self._ranges[id(node.children[2])])
-        return self._enter(node.children[0], yes, no.halting(*self._ranges[id(node.children[1])]))
+            yes = self._halting(yes, node.children[2])
+        return self._enter(node.children[0], yes, self._halting(no, node.children[1]))
 
     def inverter(self, node: Node, success: Jump, failure: Jump) -> Jump:
         """Inverter."""
