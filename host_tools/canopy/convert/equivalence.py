@@ -186,8 +186,12 @@ class _Search:
             trace.append(dict(answers.given))
 
 
-def compare(one: Machine, other: Machine, rules: Rules | None = None, *, limit: int = LIMIT, seed: int = 1) -> Verdict:
+def compare(
+    one: Machine, other: Machine, rules: Rules | None = None, *, limit: int = LIMIT, seed: int = 1, walk: bool = True
+) -> Verdict:
     """Compares two machines: exhaustively if that takes no more than `limit` cases, else a part, and as many at random.
+
+    Without `walk` nothing is tried at random: for callers to whom only a proof is of use.
 
     Raises:
         ValueError: the rules contradict each other.
@@ -195,6 +199,6 @@ def compare(one: Machine, other: Machine, rules: Rules | None = None, *, limit: 
     verdict = Verdict(seed=seed)
     search = _Search(one, other, rules or AnythingGoes(), limit, verdict)
     verdict.exhaustive = search.everything()
-    if not verdict.exhaustive:
+    if not verdict.exhaustive and walk:
         search.at_random(random.Random(seed))
     return verdict

@@ -94,6 +94,7 @@ class TreeMachine:
     """A tree as a Machine.
 
     `show` makes of a tick's status and its leaves' calls what an observer sees; `decide` says what a leaf answers.
+    `part`: it is a part of a tree, and what is above may halt it instead of ticking it.
     """
 
     def __init__(
@@ -101,9 +102,12 @@ class TreeMachine:
         tree: RunnableTree,
         show: Callable[[int, Sequence[tuple[Use, int]]], Shown],
         decide: Callable[[Use, Answers], int] = ask_each,
+        *,
+        part: bool = False,
     ) -> None:
         self.tree = tree
         self._show = show
+        self._part = part
         self._world = AskingWorld(tree, decide)
         self._nodes = build(tree.root, self._world)
         self._fixed = [{name: vars(node)[name] for name in _FIXED} for node in self._nodes]
@@ -135,7 +139,11 @@ class TreeMachine:
         self._load(state)
         self._world.answers = answers
         self._world.calls.clear()
-        status = self._nodes[0].tick()
+        if self._part and self._nodes[0].code == RUNNING and answers.ask("halted from above", (0, 1)):
+            self._nodes[0].reset()
+            status = IDLE
+        else:
+            status = self._nodes[0].tick()
         calls = [(self.tree.uses[number], kind) for number, kind in self._world.calls if number in self.tree.uses]
         shown = self._show(status, calls)
         return self._save(), shown
