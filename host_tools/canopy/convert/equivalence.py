@@ -187,7 +187,13 @@ class _Search:
 
 
 def compare(
-    one: Machine, other: Machine, rules: Rules | None = None, *, limit: int = LIMIT, seed: int = 1, walk: bool = True
+    one: Machine,
+    other: Machine,
+    rules: Rules | None = None,
+    *,
+    limit: int = LIMIT,
+    seed: int = 1,
+    walk: bool = True,
 ) -> Verdict:
     """Compares two machines: exhaustively if that takes no more than `limit` cases, else a part, and as many at random.
 
