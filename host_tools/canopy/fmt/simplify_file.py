@@ -20,7 +20,7 @@ from canopy.fmt.application_facts import (
     read_facts,
     read_threshold,
 )
-from canopy.fmt.document import Element, read_document
+from canopy.fmt.document import Content, Element, read_document
 from canopy.fmt.simplify import MAX_NODES, equivalent, simplify
 from canopy.fmt.terms import Knowledge, Term, child_elements, comments, read_term, to_element
 from canopy.fmt.writer import write_document
@@ -66,11 +66,13 @@ class Work:
 
     def tree(self, top: Element, name: str) -> None:
         """Simplifies the node of a <BehaviorTree>, or of a node that is not looked into."""
-        for place, child in enumerate(top.children):
-            if isinstance(child, Element):
-                top.children[place] = self._node(top, child, name)
+        children: list[Content] = []
+        for child in top.children:
+            children += self._node(child, name) if isinstance(child, Element) else [child]
+        top.children = children
 
-    def _node(self, top: Element, element: Element, name: str) -> Element:
+    def _node(self, element: Element, name: str) -> list[Content]:
+        """What stands in an element's place: the comments of what was rewritten, and the smaller element."""
         before = read_term(element, self.knowledge)
         if before.size() > MAX_NODES:
             raise CompileError(
@@ -80,6 +82,7 @@ class Work:
         result = simplify(before, rules)
         left = f"; {result.unproved} steps would take too long to prove" if result.unproved else ""
         left += "; not all steps were tried: the tree is too large" if result.is_exhausted else ""
+        kept: list[Content] = []
         if result.steps:
             verdict = equivalent(before, result.term, rules, WHOLE_LIMIT, walk=True)
             if verdict.difference is not None:
@@ -88,11 +91,8 @@ class Work:
             self.reports.append(Report(name, *counts, verdict, left))
             kept = comments(element)
             element = to_element(result.term)
-            if kept:
-                top.children[:0] = kept if top.tag == "BehaviorTree" else []
-                element.children[:0] = [] if top.tag == "BehaviorTree" else kept
         self._inside(result.term, name)
-        return element
+        return [*kept, element]
 
     def _inside(self, term: Term, name: str) -> None:
         """What stands below nodes that are not looked into: each child by itself."""
