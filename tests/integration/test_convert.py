@@ -51,6 +51,8 @@ FIG19 = {
     "else": {"do": "Recharge"},
 }
 
+FIG19_TEXT = json.dumps({"tree": FIG19})
+
 
 def convert(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, ["convert", *map(str, arguments)])
@@ -144,7 +146,7 @@ def test_a_trained_tree_is_its_scikit_learn_estimator_at_every_raw_value(tmp_pat
         estimator = DecisionTreeClassifier(max_depth=depth, random_state=0).fit(values, wanted)
         exported, output = tmp_path / "trained.json", tmp_path / "trained.xml"
         export(estimator, exported, ["Battery.Level"], {0: "Recharge", 1: "PerformTask"})
-        good("decision-tree", exported, *BUS, "-o", output)
+        good("decision-tree", exported, *BUS, "--limit", "5000", "-o", output)
         predicted = ["PerformTask" if p else "Recharge" for p in estimator.predict(values)]
         assert [decided(read_result(output).root, Fraction(raw, 10)) for raw in range(1001)] == predicted
 
@@ -196,9 +198,16 @@ def test_thresholds_outside_of_the_range(tmp_path: Path) -> None:
     result = convert("decision-tree", written(tmp_path, {"tree": tree}), *BUS)
     assert result.exit_code == 0
     assert "Battery.Level <= 100.5 is always true in the signal's range: only whether it is fresh" in result.stderr
-    assert "Battery.Level > 200.0 is never true" in result.stderr
+    assert "Battery.Level > 200 is never true" in result.stderr
     assert 'code="Battery.fresh"' in result.stdout
     assert "<A/>" not in result.stdout
+
+
+def test_thresholds_far_away(tmp_path: Path) -> None:
+    tree = {"if": {"signal": "Battery.Level", "at_most": 0}, "then": {"do": "A"}, "else": {"do": "B"}}
+    text = json.dumps({"tree": tree}).replace('"at_most": 0', '"at_most": 1e400')
+    result = convert("decision-tree", written(tmp_path, text), *BUS)
+    assert result.exit_code == 0 and "is always true" in result.stderr
 
 
 def test_a_large_decision_tree_is_not_called_exhaustive(tmp_path: Path) -> None:
@@ -239,6 +248,10 @@ def test_a_large_decision_tree_is_not_called_exhaustive(tmp_path: Path) -> None:
             "needs either at_most or above",
         ),
         ('{"tree": {"if": {"signal": "Battery.Level", "above": NaN}}}', "NaN is not a number"),
+        (
+            FIG19_TEXT.replace('"above": 30', '"above": 1e400').replace("{", '{"comparison": "float32", ', 1),
+            "tree.then.else.if.above is too large for a double",
+        ),
         ('{"comparison": "float16", "tree": {"do": "A"}}', "did you mean 'float32'?"),
     ],
 )

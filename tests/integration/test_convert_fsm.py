@@ -183,10 +183,10 @@ def test_the_order_of_a_transition_is_scxmls(tmp_path: Path) -> None:
 
 def test_random_state_machines(tmp_path: Path) -> None:
     rng = random.Random(20)
-    for number in range(40):
+    for number in range(25):
         source = written(tmp_path, random_chart(rng), "random.scxml")
         output = tmp_path / "random.xml"
-        result = convert("fsm", source, "-o", output, "--limit", "3000")
+        result = convert("fsm", source, "-o", output, "--limit", "1500")
         assert result.exit_code == 0, (number, result.output, source.read_text())
         if number % 5 == 0:
             run_in_engine(output, tmp_path, ChartMachine(read_scxml(source)), rng, 200)
@@ -378,6 +378,17 @@ def test_c_that_cannot_be_checked_is_not_written(tmp_path: Path, monkeypatch: py
     assert "there is no C compiler 'no-such-compiler'" in told and not output.exists()
     result = convert("to-fsm", tree, "--format", "c", "--unchecked", "-o", output)
     assert result.exit_code == 0 and "not checked" in result.stderr and output.exists()
+
+
+def test_names_that_are_no_words(tmp_path: Path) -> None:
+    text = (REPOSITORY / "examples" / "papers" / "trees" / "fig2.xml").read_text(encoding="utf-8")
+    text = text.replace("EnterThroughFrontDoor", "Enter-Front.Door").replace("TwoDoors", "a &quot;b&quot; c")
+    assert "&quot;" in text
+    tree = written(tmp_path, text, "names.xml")
+    for form in ("scxml", "dot", "c"):
+        good("to-fsm", tree, "--format", form)
+    tree = written(tmp_path, text.replace("a &quot;b&quot; c", "7 dwarfs */"), "names.xml")
+    assert "makes no name in C" in bad("to-fsm", tree, "--format", "c")
 
 
 def test_the_command_is_listed() -> None:

@@ -195,6 +195,21 @@ def test_wrong_facts_are_named(tmp_path: Path, facts: str, message: str) -> None
     assert path.read_bytes() == before
 
 
+def test_facts_against_a_declaration_are_named(tmp_path: Path) -> None:
+    metadata = '<MetadataFields><Metadata returns="SUCCESS"/></MetadataFields>'
+    model = f'<Action ID="Go"/><Condition ID="Yes">{metadata}</Condition>'
+    path = write(tmp_path, "<Sequence><Yes/><Yes/><Go/></Sequence>", model)
+    (tmp_path / "app.facts").write_text("Yes implies not Yes", encoding="utf-8")
+    result = fmt("--simplify", "--facts", tmp_path / "app.facts", path)
+    assert result.exit_code == 2 and "the facts leave no answer for" in result.output
+
+
+def test_a_part_that_is_too_large_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, f"<Sequence>{'<Go/>' * 300}</Sequence>")
+    result = fmt("--simplify", path)
+    assert result.exit_code == 2 and "has 301 nodes, too many to be simplified" in result.output
+
+
 def test_options_that_do_not_go_together(tmp_path: Path) -> None:
     assert "--facts goes with --simplify" in fmt("--facts", tmp_path / "x", tmp_path / "y").output
     assert "--simplify needs files" in fmt("--simplify", "-").output

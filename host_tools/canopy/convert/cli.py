@@ -16,7 +16,7 @@ from canopy.compiler.names import is_c_identifier
 from canopy.convert import decision_tree, fsm, fsm_c, fsm_files, funnels, subsumption, to_fsm
 from canopy.convert.chart_machine import ChartMachine
 from canopy.convert.equivalence import LIMIT, Machine, Verdict, compare
-from canopy.convert.machine import TreeMachine, show_acting, show_calls
+from canopy.convert.machine import TreeMachine, affordable, show_acting, show_calls
 from canopy.convert.read_back import read_result, runnable, signal_inputs
 from canopy.convert.result import NotEqualError, write_checked
 from canopy.convert.scxml import read_scxml
@@ -111,7 +111,7 @@ def decision_tree_command(
                 read_result(path, dbc, node or ""), signal_inputs(bus, wanted) if bus else {}, per_use=False
             )
             one = decision_tree.DecisionMachine(source, signals, shape)
-            return compare(one, TreeMachine(read, show_acting), limit=limit, seed=seed)
+            return compare(one, TreeMachine(read, show_acting), limit=affordable(limit, read), seed=seed)
 
         for note in made.notes:
             click.echo(f"note: {note}", err=True)
@@ -156,7 +156,7 @@ def subsumption_command(
         def check(path: Path) -> Verdict:
             tree = runnable(read_result(path), per_use=False)
             one = subsumption.ArbiterMachine(layers, otherwise)
-            return compare(one, TreeMachine(tree, show_calls), limit=limit, seed=seed)
+            return compare(one, TreeMachine(tree, show_calls), limit=affordable(limit, tree), seed=seed)
 
         comment = "A subsumption architecture, the highest layer first: who wants control is RUNNING, else FAILURE."
         _finish(tree_file(_checked_id(tree_id, "Subsumption"), root, leaves, comment), output, check)
@@ -187,7 +187,8 @@ def funnels_command(file: Path, tree_id: str | None, output: str, limit: int, se
         def check(path: Path) -> Verdict:
             tree = runnable(read_result(path), per_use=False)
             made = TreeMachine(tree, funnels.show, funnels.decide(family))
-            return compare(funnels.BurridgeMachine(family, order.placed), made, limit=limit, seed=seed)
+            one = funnels.BurridgeMachine(family, order.placed)
+            return compare(one, made, limit=affordable(limit, tree), seed=seed)
 
         comment = f"Sequential composition of {file.name}: each controller prepares one before it."
         leaves = merge_leaves(models, Place(str(file)))
@@ -208,8 +209,9 @@ def fsm_command(file: Path, tree_id: str | None, output: str, limit: int, seed: 
         root, models = fsm.convert(chart)
 
         def check(path: Path) -> Verdict:
-            made = TreeMachine(runnable(read_result(path), per_use=False), show_calls)
-            return compare(ChartMachine(chart), made, limit=limit, seed=seed)
+            tree = runnable(read_result(path), per_use=False)
+            made = TreeMachine(tree, show_calls)
+            return compare(ChartMachine(chart), made, limit=affordable(limit, tree), seed=seed)
 
         comment = f"The state machine {file.name}."
         name = _checked_id(tree_id, chart.name)
@@ -243,8 +245,9 @@ def to_fsm_command(tree: Path, form: str, unchecked: bool, output: str, limit: i
         write = {"scxml": fsm_files.write_scxml, "dot": fsm_files.write_dot, "c": fsm_c.write_c}[form]
 
         def check(path: Path) -> Verdict:
-            source = TreeMachine(runnable(parsed, declared=False), show_calls)
-            return compare(source, _written(machine, form, path), limit=limit, seed=seed)
+            source = runnable(parsed, declared=False)
+            made = _written(machine, form, path)
+            return compare(TreeMachine(source, show_calls), made, limit=affordable(limit, source), seed=seed)
 
         _finish(write(machine), output, None if unchecked else check)
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from canopy.compiler.bus_model import Bus, Signal
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.numbers import plain
 from canopy.convert.equivalence import Answers, Shown, State
 from canopy.convert.json_input import fields, number, read_json, text
 from canopy.convert.machine import SignalInput
@@ -87,7 +88,10 @@ def _predicate(value: Any, place: Place, where: str, float32: bool) -> Asked | T
     signal = text(found["signal"], place, f"{where}.if.signal")
     limit = number(found[limits[0]], place, f"{where}.if.{limits[0]}")
     if float32:  # scikit-learn's threshold is a double, and its shortest decimal is written
-        limit = Fraction(float(limit))
+        try:
+            limit = Fraction(float(limit))
+        except OverflowError:
+            raise CompileError(place, f"{where}.if.{limits[0]} is too large for a double") from None
     return Threshold(signal, limit, limits[0] == "above", float32)
 
 
@@ -233,7 +237,7 @@ class _Converter:
             always = (below == grid.count) != predicate.above
             what = "only whether it is fresh is asked" if always else "its branch is left out"
             self.notes.append(
-                f"{predicate.signal} {'>' if predicate.above else '<='} {float(predicate.limit)!r} is "
+                f"{predicate.signal} {'>' if predicate.above else '<='} {plain(predicate.limit)} is "
                 f"{'always' if always else 'never'} true in the signal's range: {what}"
             )
             return node("ScriptCondition", code=f"{predicate.signal.partition('.')[0]}.fresh") if always else None

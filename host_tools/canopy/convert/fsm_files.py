@@ -67,21 +67,30 @@ def write_scxml(machine: Machine) -> str:
     return write_document(Document('<?xml version="1.0" encoding="UTF-8"?>', [root]))
 
 
+def _quoted(text: str) -> str:
+    """The inside of a text in DOT."""
+    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+
+
 def write_dot(machine: Machine) -> str:
     """DOT: leaves are boxes, edges S, R and F; clusters are the boxes of Fig. 11."""
-    lines = [f'digraph "{machine.name}" {{', "  rankdir=LR;", f'  "{SOURCE}" [label="Tick\\nSource", shape=circle];']
+    lines = [
+        f'digraph "{_quoted(machine.name)}" {{',
+        "  rankdir=LR;",
+        f'  "{SOURCE}" [label="Tick\\nSource", shape=circle];',
+    ]
     count = 0
 
     def box(group: Group, indent: str) -> None:
         nonlocal count
         count += 1
-        label = group.name.replace("\\", "\\\\").replace('"', '\\"')
+        label = _quoted(group.name)
         lines.append(f"{indent}subgraph cluster_{count} {{")
         lines.append(f'{indent}  label="{label}";')
         for part in group.parts:
             if isinstance(part, int):
                 vertex = machine.vertices[part]
-                name = vertex.name.replace("\\", "\\\\").replace('"', '\\"')
+                name = _quoted(vertex.name)
                 lines.append(f'{indent}  "{vertex.id}" [label="{name}", shape=box];')
             else:
                 box(part, f"{indent}  ")

@@ -86,6 +86,15 @@ def ask_each(use: Use, answers: Answers) -> int:
     return answers.ask(use.key, use.statuses)
 
 
+WORK = 5_000_000
+"""Nodes that are put into a state in one comparison, some ten seconds."""
+
+
+def affordable(limit: int, tree: RunnableTree) -> int:
+    """As many cases as asked for, or fewer where the tree is so large that each takes long."""
+    return min(limit, max(1_000, WORK // sum(1 for _ in tree.root.walk())))
+
+
 def _frozen(value: object) -> Hashable:
     return tuple(sorted(value.items())) if isinstance(value, dict) else value
 

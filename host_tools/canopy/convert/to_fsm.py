@@ -10,6 +10,7 @@ rejected by name.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -117,7 +118,7 @@ class _Builder:
         self._ranges[id(node)] = (first, len(self.vertices))
 
     def _word(self, node: Node) -> str:
-        word = node.leaf.id if node.leaf is not None else node.type.name
+        word = re.sub(r"\W", "_", node.leaf.id if node.leaf is not None else node.type.name, flags=re.ASCII)
         used = {vertex.id for vertex in self.vertices}
         number = 2
         candidate = word

@@ -50,6 +50,7 @@ class Report:
 class Work:
     """One file: what is known of its leaves, and what was done."""
 
+    path: Path
     knowledge: Knowledge
     facts: Facts
     reports: list[Report] = field(default_factory=list)
@@ -76,10 +77,17 @@ class Work:
         before = read_term(element, self.knowledge)
         if before.size() > MAX_NODES:
             raise CompileError(
-                Place(name), f"a part of {before.size()} nodes cannot be simplified", f"{MAX_NODES} nodes at most"
+                Place(str(self.path)),
+                f"a part of tree '{name}' has {before.size()} nodes, too many to be simplified",
+                f"at most {MAX_NODES}: make subtrees of it, or format it without --simplify",
             )
         rules = self.rules(before)
-        result = simplify(before, rules)
+        try:
+            result = simplify(before, rules)
+        except ValueError as error:
+            raise CompileError(
+                Place(str(self.path)), f"tree '{name}': {error}", "correct the facts, or `returns`"
+            ) from error
         left = f"; {result.unproved} steps would take too long to prove" if result.unproved else ""
         left += "; not all steps were tried: the tree is too large" if result.is_exhausted else ""
         kept: list[Content] = []
@@ -110,7 +118,7 @@ def simplify_bytes(path: Path, facts_file: Path | None) -> tuple[bytes, list[Rep
     leaves = read_tree(path, ANY_TYPE).leaves
     facts = read_facts(facts_file, leaves) if facts_file is not None else Facts()
     document = read_document(path.read_bytes(), str(path))
-    work = Work(Knowledge(leaves, facts.returns, frozenset(facts.memoryless)), facts)
+    work = Work(path, Knowledge(leaves, facts.returns, frozenset(facts.memoryless)), facts)
     for root in document.content:
         for tree in child_elements(root) if isinstance(root, Element) else ():
             if tree.tag == "BehaviorTree":
