@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.names import is_c_identifier, snake
+from canopy.compiler.names import snake
 from canopy.convert.equivalence import Answers, Shown, State
 from canopy.convert.to_fsm import Jump, Machine, Vertex
 from canopy.semantics.spec import CONTINUE, FAILURE, HALTED, RUNNING, START, SUCCESS
@@ -135,10 +135,6 @@ def write_c(machine: Machine) -> str:
     """One header, which needs nothing else."""
     name, count = snake(machine.name), len(machine.vertices)
     upper = name.upper()
-    if not is_c_identifier(name):
-        raise CompileError(
-            Place(machine.name), f"the tree's ID '{machine.name}' makes no name in C", "choose another ID"
-        )
     if count == 0:
         raise CompileError(Place(machine.name), "a tree without a leaf of yours has nothing to be made C of")
     leaves = [f"    {upper}_LEAF_{snake(vertex.id).upper()} = {i}," for i, vertex in enumerate(machine.vertices)]
@@ -147,8 +143,8 @@ def write_c(machine: Machine) -> str:
         cells = ", ".join(_jump(vertex.jumps.get(status), count) for status in (RUNNING, SUCCESS, FAILURE))
         rows.append(f"        {{{cells}}}, /* {vertex.name.replace('*/', '* /')} */")
     return _HEADER.format(
-        tree=machine.name.replace("*/", "* /"), name=name, upper=upper, count=count, leaves="\n".join(leaves), jumps="\n".join(rows),
-        begin=_jump(machine.begin, count),
+        tree=machine.name.replace("*/", "* /"), name=name, upper=upper, count=count, leaves="\n".join(leaves),
+        jumps="\n".join(rows), begin=_jump(machine.begin, count),
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from canopy.check.facts import Facts
 from canopy.check.status_sets import K
 from canopy.compiler.errors import CompileError
+from canopy.compiler.names import snake
 from canopy.compiler.tree import Node, Tree
 from canopy.convert.equivalence import Answers, Shown, State
 from canopy.convert.read_back import MAX_DEPTH, leaf_key, name_of, statuses_of
@@ -119,10 +120,10 @@ class _Builder:
 
     def _word(self, node: Node) -> str:
         word = re.sub(r"\W", "_", node.leaf.id if node.leaf is not None else node.type.name, flags=re.ASCII)
-        used = {vertex.id for vertex in self.vertices}
+        used = {snake(vertex.id) for vertex in self.vertices}
         number = 2
         candidate = word
-        while candidate in used:
+        while snake(candidate) in used:
             candidate, number = f"{word}_{number}", number + 1
         return candidate
 
