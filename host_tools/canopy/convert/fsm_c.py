@@ -136,7 +136,7 @@ def write_c(machine: Machine) -> str:
     name, count = snake(machine.name), len(machine.vertices)
     upper = name.upper()
     if count == 0:
-        raise CompileError(Place(machine.name), "a tree without a leaf of yours has nothing to be made C of")
+        raise CompileError(Place(machine.name), "the tree has no user-defined leaf: there is nothing to make C of")
     leaves = [f"    {upper}_LEAF_{snake(vertex.id).upper()} = {i}," for i, vertex in enumerate(machine.vertices)]
     rows = []
     for vertex in machine.vertices:

@@ -80,7 +80,7 @@ class _Reader:
             raise CompileError(
                 node.place,
                 f"<{node.xml_name or kind}> cannot be checked for equivalence",
-                "it depends on the time, on when entries are written, or on your C",
+                "it depends on the time, on when entries are written, or on your code",
             )
         if node.leaf is not None:
             statuses = tuple(sorted(STATUS_OF[status] for status in leaf_statuses(node)))
