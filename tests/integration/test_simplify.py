@@ -244,8 +244,8 @@ def test_what_follows_from_thresholds_is_what_holds_for_every_value() -> None:
 CONTROLS = ["Sequence", "Fallback", "ReactiveSequence", "ReactiveFallback"]
 
 
-def random_tree(rng: random.Random) -> tuple[str, str]:
-    """A tree in which each action stands once and conditions often; and its model."""
+def random_tree(rng: random.Random, repeat: bool = False) -> tuple[str, str]:
+    """A tree in which each action stands once (with `repeat`, often), and conditions often; and its model."""
     actions = [f"A{number}" for number in range(6)]
     left = list(actions)
     size = rng.randint(4, 16)
@@ -256,7 +256,7 @@ def random_tree(rng: random.Random) -> tuple[str, str]:
         if depth == 0 or size <= 0 or rng.random() < 0.25:
             choice = rng.random()
             if choice < 0.5 and left:
-                return f"<{left.pop(0)}/>"
+                return f"<{rng.choice(left[:3]) if repeat else left.pop(0)}/>"
             return rng.choice(["<P/>", "<Q/>", "<AlwaysSuccess/>", "<AlwaysFailure/>", "<P/>", "<Q/>"])
         kind = rng.choice([*CONTROLS, *CONTROLS, "Inverter", "ForceSuccess", "ForceFailure", "WhileDoElse"])
         if kind == "WhileDoElse":
@@ -303,3 +303,31 @@ def test_random_trees_do_the_same_in_the_engine(tmp_path: Path) -> None:
             answers = {leaf.id: words[rng.choice(leaf.returns or ("SUCCESS", "FAILURE"))] for leaf in leaves}
             assert one.tick(answers) == other.tick(answers), (before.read_text(), after.read_text())
     assert smaller > 80
+
+
+def test_random_trees_with_facts_do_the_same_in_the_engine(tmp_path: Path) -> None:
+    """Actions without memory stand several times; P implies Q. Seen are the status, and which actions are ticked."""
+    rng = random.Random(8)
+    library = build(tmp_path)
+    words = {"RUNNING": RUNNING, "SUCCESS": SUCCESS, "FAILURE": FAILURE}
+    facts = tmp_path / "app.facts"
+    facts.write_text("\n".join(["P implies Q", *(f"A{n} is memoryless" for n in range(6))]), encoding="utf-8")
+    merged = 0
+    for _ in range(150):
+        root, model = random_tree(rng, repeat=True)
+        before, after = write(tmp_path, root, model), tmp_path / "after.xml"
+        shutil.copy(before, after)
+        assert fmt("--simplify", "--facts", facts, after).exit_code == 0
+        one, other = Run(library, before), Run(library, after)
+        merged += len(other.engine.nodes) < len(one.engine.nodes) - 3
+        leaves = read_tree(before).leaves.values()
+        for _ in range(200):
+            answers = {leaf.id: words[rng.choice(leaf.returns or ("SUCCESS", "FAILURE"))] for leaf in leaves}
+            if answers["P"] == SUCCESS:
+                answers["Q"] = SUCCESS
+            seen = []
+            for run in (one, other):
+                status, calls = run.tick(answers)
+                seen.append((status, [name for name, what in calls if what != "halt"]))
+            assert seen[0] == seen[1], (before.read_text(), after.read_text())
+    assert merged > 40
