@@ -15,10 +15,11 @@ write to its output ports of texts, separated by semicolons: texts are constants
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 
-Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that
-the leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one
-cleans up after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps
-a condition's threshold from chattering).
+Metadata that only `canopy check` and `canopy fmt --simplify` use (docs/lint.md, docs/tools.md), and that changes no
+generated code: `returns` (the statuses that the leaf can return, if fewer than its kind allows), `undoes` and
+`achieves` (IDs of leaves: the action that this one cleans up after, the condition that it makes true), `moves` (signals
+that its acting changes), `safeguards` (signals that it keeps in their safe range), `hysteresis` (what keeps a
+condition's threshold from chattering), `holds` (the comparison of a signal with a number that a condition is).
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ METADATA = (
     "achieves",
     "moves",
     "hysteresis",
+    "holds",
+    "safeguards",
 )
 ACTION_KINDS = ("SyncAction", "StatefulAction")
 INNER_KINDS = ("Control", "Decorator")
@@ -103,6 +106,8 @@ class Leaf:
     achieves: tuple[str, ...] = ()
     moves: tuple[str, ...] = ()
     hysteresis: str = ""
+    holds: str = ""
+    safeguards: tuple[str, ...] = ()
     problem: UnsupportedTypeError | None = field(default=None, compare=False)
 
     @property
@@ -258,6 +263,8 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         achieves=_words(draft, "achieves"),
         moves=_words(draft, "moves"),
         hysteresis=draft.metadata.get("hysteresis", ("", None))[0],
+        safeguards=_words(draft, "safeguards"),
+        holds=draft.metadata.get("holds", ("", None))[0],
         problem=draft.problem,
     )
 

@@ -12,6 +12,7 @@ import click
 
 from canopy.compiler.errors import CompileError, Place
 from canopy.fmt.document import read_document
+from canopy.fmt.simplify_file import simplify_bytes
 from canopy.fmt.writer import write_document
 
 WOULD_CHANGE = 1
@@ -37,11 +38,18 @@ def _replace(path: Path, data: bytes) -> None:
         raise
 
 
-def _format_file(path: Path, check: bool) -> bool:
-    """Formats a file in place, unless `check`. Was it not in canonical form?"""
+def _simplified(path: Path, facts: Path | None) -> bytes:
+    formatted, reports = simplify_bytes(path, facts)
+    for report in reports:
+        click.echo(f"{path}: {report}", err=True)
+    return formatted
+
+
+def _format_file(path: Path, check: bool, simplify: bool, facts: Path | None) -> bool:
+    """Formats a file in place, unless `check`. Was it not in canonical form, or not simple?"""
     try:
         data = path.read_bytes()
-        formatted = format_bytes(data, str(path))
+        formatted = _simplified(path, facts) if simplify else format_bytes(data, str(path))
         if formatted != data and not check:
             _replace(path, formatted)
     except OSError as error:
@@ -49,10 +57,23 @@ def _format_file(path: Path, check: bool) -> bool:
     return formatted != data
 
 
+def _found(check: bool, simplify: bool) -> str:
+    """What is said about a file that changes."""
+    if check:
+        return "not in canonical form, or not simple" if simplify else "not in canonical form"
+    return "formatted"
+
+
 @click.command()
 @click.argument("files", metavar="FILE…", nargs=-1, required=True)
 @click.option("--check", is_flag=True, help="Change nothing; exit with status 1 if a file is not in canonical form.")
-def command(files: tuple[str, ...], check: bool) -> None:
+@click.option("--simplify", is_flag=True, help="Also remove what cannot matter; each step is proved.")
+@click.option(
+    "--facts",
+    type=click.Path(path_type=Path),
+    help="What is known of the leaves, for --simplify: 'A implies B', 'A returns RUNNING', …",
+)
+def command(files: tuple[str, ...], check: bool, simplify: bool, facts: Path | None) -> None:
     """Write tree files in one canonical form, without loss (docs/tools.md).
 
     `-` formats standard input to standard output.
@@ -64,7 +85,12 @@ def command(files: tuple[str, ...], check: bool) -> None:
       canopy fmt trees/*.xml
       canopy fmt --check trees/*.xml
       canopy fmt - < drawn.xml > tidy.xml
+      canopy fmt --simplify --facts robot.facts trees/*.xml
     """
+    if facts is not None and not simplify:
+        raise click.UsageError("--facts goes with --simplify")
+    if simplify and "-" in files:
+        raise click.UsageError("--simplify needs files: what leaves are declared may stand in others that they include")
     changed = unreadable = False
     for name in files:
         try:
@@ -76,14 +102,14 @@ def command(files: tuple[str, ...], check: bool) -> None:
                     sys.stdout.buffer.write(formatted)
                     continue
             else:
-                differs = _format_file(Path(name), check)
+                differs = _format_file(Path(name), check, simplify, facts)
         except CompileError as error:
             click.echo(str(error), err=True)
             unreadable = True
             continue
         if differs:
             changed = True
-            click.echo(f"{name}: {'not in canonical form' if check else 'formatted'}", err=check)
+            click.echo(f"{name}: {_found(check, simplify)}", err=check)
     if unreadable:
         sys.exit(INPUT_ERROR)
     sys.exit(WOULD_CHANGE if check and changed else 0)
