@@ -32,17 +32,19 @@ from canopy.compiler.leaf_c import (
     parameters,
     port_members,
     prototypes,
-    setters,
+    setter,
     stale_test,
     text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
-from canopy.compiler.port_types import Options, PortType, c_string
+from canopy.compiler.port_types import Options, PortType
 from canopy.compiler.row_c import place_constant, row_fields
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
 from canopy.compiler.tree_reader import read_tree
+from canopy.escape import c_templates
+from canopy.escape.c import header, string
 
 MODEL_FORMAT = 1
 
@@ -181,11 +183,6 @@ def model(application: Application) -> dict[str, object]:
     }
 
 
-def _comment(text: str) -> str:
-    """Text that may stand inside a C comment."""
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
-
-
 def _queues(table: Table) -> list[PortType]:
     """The types of queues, each once."""
     kinds = [port.type for use in table.users for port in use.leaf.ports]
@@ -210,14 +207,8 @@ def _exact(place: Place) -> str:
 
 def environment(bus: Bus) -> jinja2.Environment:
     """The templates, with what they call."""
-    result = jinja2.Environment(
-        loader=jinja2.PackageLoader("canopy.compiler"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    result.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
+    result = c_templates.environment("canopy.compiler")
+    result.filters |= {"snake": snake, "short": _short, "exact": _exact, "c_string": string, "c_header": header}
     result.filters["identifier"] = _identifier
     result.globals |= {
         "codec": codec,
@@ -227,7 +218,7 @@ def environment(bus: Bus) -> jinja2.Environment:
         "prototypes_of": prototypes,
         "function_names_of": function_names,
         "port_members": port_members,
-        "setters": setters,
+        "setter": setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
         "item_type": item_type,
