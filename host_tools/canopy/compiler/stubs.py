@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.emit import environment
-from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.layout import layout
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.table import Table
@@ -41,19 +39,3 @@ def stubs(name: str, table: Table, bus: Bus) -> str:
     """The C file: every function once, in the order of <application>_leaves.h."""
     template = environment(bus).get_template("stubs.c.j2")
     return layout(template.render(name=name, users=table.users, bus=bus, body_of=_body))
-
-
-def write_stubs(path: Path, text: str) -> None:
-    """Writes a new file.
-
-    Raises:
-        CompileError: the file is there already; it is never overwritten.
-        OSError: it cannot be written.
-    """
-    try:
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-    except FileExistsError:
-        raise CompileError(
-            Place(str(path)), "is there already, and is not overwritten", "name a new file, and copy what is missing"
-        ) from None

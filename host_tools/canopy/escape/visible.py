@@ -31,7 +31,8 @@ def visible(text: str, keep: str = "") -> str:
 
 
 def brief(text: str) -> str:
-    """visible(), and cut where it is longer than any reader has patience for."""
+    """visible(), with the middle left out where it is longer than any reader has patience for."""
     if len(text) > LONGEST:
-        text = f"{text[:LONGEST]}… ({len(text)} characters)"
+        half = LONGEST // 2
+        text = f"{text[:half]} … ({len(text) - LONGEST} characters) … {text[-half:]}"
     return visible(text)
