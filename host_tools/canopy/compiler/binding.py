@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from canopy.compiler.blackboard import Entry, SignalName, Use
 from canopy.compiler.bus_reader import Bus
@@ -43,6 +44,11 @@ class Bindings:
     leaves: dict[str, Leaf] = field(default_factory=dict)
     ports: dict[int, tuple[BoundPort, ...]] = field(default_factory=dict)
     counted_ports: set[tuple[str, str]] = field(default_factory=set)
+
+    @cached_property
+    def text_places(self) -> dict[str, int]:
+        """The place of each text."""
+        return {text: place for place, text in enumerate(self.texts)}
 
 
 def preorder(root: Node) -> list[Node]:
@@ -100,7 +106,8 @@ class _Binder:
             if node.leaf is not None and node.bound:
                 bindings.ports[id(node)] = tuple(self._port(node, bound, bindings) for bound in node.bound)
         bindings.entries = tuple(e for e in self._tree.board.entries if not e.is_constant and e.uses)
-        bindings.texts = tuple(self._texts.all) if len(self._texts.all) > 1 or self._uses_text() else ()
+        texts = self._texts.all
+        bindings.texts = texts if len(texts) > 1 or self._uses_text() else ()
         return bindings
 
     def _uses_text(self) -> bool:

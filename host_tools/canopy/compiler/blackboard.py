@@ -79,16 +79,17 @@ class Blackboard:
     def __init__(self) -> None:
         self.entries: list[Entry] = []
         self.main = Scope(self, "")
-        self._c_names: set[str] = set()
+        self._c_names: dict[str, int] = {}  # with the last number that was put behind it
 
     def make(self, name: str, path: str, place: Place) -> Entry:
         """A new entry, with a C name of its own."""
         stem = snake(f"{path} {name}") if path else snake(name)
-        c_name, number = stem, 1
+        c_name, number = stem, self._c_names.get(stem, 0)
         while c_name in self._c_names:
             number += 1
             c_name = f"{stem}_{number}"
-        self._c_names.add(c_name)
+        self._c_names[stem] = max(number, 1)
+        self._c_names.setdefault(c_name, 1)
         entry = Entry(name, path, c_name, place)
         self.entries.append(entry)
         return entry

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
@@ -139,11 +139,11 @@ def writes_texts(leaf: Leaf) -> bool:
 
 
 @emits_c
-def text_constants(leaf: Leaf, texts: Sequence[str]) -> list[tuple[str, int, str]]:
+def text_constants(leaf: Leaf, places: Mapping[str, int]) -> list[tuple[str, int, str]]:
     """(C name, place in the table, text) of what the leaf may write."""
     if not writes_texts(leaf):
         return []
-    return [(f"{leaf.c_name}_{snake(text)}".upper(), texts.index(text), text) for text in leaf.texts]
+    return [(f"{leaf.c_name}_{snake(text)}".upper(), places[text], text) for text in leaf.texts]
 
 
 def entry_note(entry: Entry) -> str:
