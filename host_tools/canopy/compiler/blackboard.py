@@ -36,11 +36,17 @@ class Entry:
     initial: str | None = None
     counted: bool = False
     queue: int = 0
+    is_written: bool = False
+
+    def connect(self, use: Use) -> None:
+        """One more end."""
+        self.uses.append(use)
+        self.is_written = self.is_written or use.writes
 
     @property
     def is_constant(self) -> bool:
         """Nothing writes it: it is the literal that its SubTree was given."""
-        return self.initial is not None and not any(use.writes for use in self.uses)
+        return self.initial is not None and not self.is_written
 
     def settle_type(self) -> None:
         """Takes the type from the uses.
@@ -158,7 +164,7 @@ class Scope:
 
 
 def _is_given(entry: Entry) -> bool:
-    return entry.initial is not None or any(use.writes for use in entry.uses)
+    return entry.initial is not None or entry.is_written
 
 
 def pointer(text: str, own_name: str) -> str | None:

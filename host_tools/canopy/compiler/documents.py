@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_model import Declarations, read_model
+from canopy.compiler.leaf_model import Declarations, Leaf, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, parse_xml
 from canopy.files import FileError, read_bytes
@@ -24,6 +25,11 @@ class Documents:
     trees: dict[str, Element] = field(default_factory=dict)
     main: str = ""
     declarations: Declarations = field(default_factory=Declarations)
+
+    @cached_property
+    def usable_leaves(self) -> dict[str, Leaf]:
+        """The leaves that a tree can use, by ID."""
+        return {name: leaf for name, leaf in self.declarations.leaves.items() if leaf.problem is None}
 
 
 class _Reader:
