@@ -49,7 +49,7 @@ def _clean_usage_errors() -> Iterator[None]:
     try:
         yield
     except click.ClickException as error:
-        vars(error)["message"] = visible(error.message, keep="\n")  # "final" to type checkers
+        vars(error)["message"] = visible(error.message)  # "final" to type checkers
         raise
 
 
