@@ -174,13 +174,14 @@ def write_files(files: Mapping[Path, bytes], new: Collection[Path] = (), mode: i
         for temporary, path in work.staged:
             with _about(path):
                 work.commit(temporary, path, path.absolute() in protected)
+        for folder in dict.fromkeys(path.parent for _, path in work.staged):
+            with _about(folder):
+                _sync_folder(folder)
     except BaseException:
         work.undo()
         raise
     finally:
         work.clean()
-    for folder in {path.parent for path in files}:
-        _sync_folder(folder)
 
 
 def _target(path: Path) -> Path:

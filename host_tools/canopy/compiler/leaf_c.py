@@ -102,7 +102,9 @@ def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[
     notes.append(f"Written with {leaf.c_name}_set_{port.c_name}().")
     members = [(mark_c(f"{_stored(port.type)} *{port.c_name};"), " ".join(notes))]
     if (leaf.id, port.name) in counted:
-        members.append((mark_c(f"uint32_t *{port.c_name}_updates;"), "Counts the writes, for nodes that wait for them."))
+        members.append(
+            (mark_c(f"uint32_t *{port.c_name}_updates;"), "Counts the writes, for nodes that wait for them.")
+        )
     return members
 
 

@@ -1,0 +1,398 @@
+# SPDX-License-Identifier: MIT
+"""No file hangs the tools or brings a traceback, and what they write is the old set of files or the new one."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from itertools import count, product
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from canopy.cli import main
+from canopy.files import FileError, read_bytes, read_text, write_files
+from canopy.model import ModelError, load_model
+from canopy.signals import load_database
+from canopy.watch import Watch
+from integration.language import DBC, ROOT, WARNINGS
+
+HEAD = '<root BTCPP_format="4" main_tree_to_execute="Main">'
+TREE = HEAD + '<BehaviorTree ID="Main">{}</BehaviorTree>{}</root>'
+ROOM = ROOT / "tests" / "golden" / "cooler.xml"
+MEGABYTE = 1_000_000
+
+pytestmark = pytest.mark.timeout(120)
+
+
+def canopy(*arguments: str | bytes | Path, seconds: float = 30, **more: object) -> subprocess.CompletedProcess[bytes]:
+    """The command as a process; a test fails when it hangs."""
+    command = [sys.executable, "-m", "canopy", *arguments]
+    return subprocess.run(command, capture_output=True, timeout=seconds, check=False, **more)  # type: ignore[call-overload,no-any-return]
+
+
+def commands(file: str | bytes | Path) -> dict[str, list[str | bytes | Path]]:
+    """Every command that reads a file, with this one."""
+    more = ["--node", "Controller", "--period-ms", "10"]
+    return {
+        "tree": ["compile", file, "--dbc", DBC, *more, "-o", "out", "--name", "x"],
+        "dbc": ["compile", "main.xml", "--dbc", file, *more, "-o", "out"],
+        "codec": ["codec", file, "-o", "out"],
+        "check": ["check", file],
+        "check --dbc": ["check", "main.xml", "--dbc", file, "--node", "Controller"],
+        "show": ["show", file],
+        "fmt": ["fmt", "--check", file],
+        "image build": ["image", "build", "main.xml", "--for", file, "-o", "out.img"],
+        "image show": ["image", "show", file],
+        "monitor": ["monitor", "--model", file, "--can", "unixbus:x", "--duration", "1"],
+        "bridge": ["bridge", "--model", file, "--can", "unixbus:x", "--duration", "1"],
+        "record": ["record", "--model", file, "--can", "unixbus:x", "-o", "a.log", "--duration", "1"],
+        "replay": ["replay", file, "--model", "room.model.json", "--program", "x"],
+    }
+
+
+KINDS: dict[str, Callable[[Path], object]] = {
+    "a FIFO": os.mkfifo,
+    "a folder": Path.mkdir,
+    "a device": lambda path: path.symlink_to("/dev/zero"),
+    "a link to itself": lambda path: path.symlink_to(path.name),
+    "nothing": lambda _: None,
+    "not UTF-8": lambda path: path.write_bytes(b'<root a="\x81\xff">\x81</root>'),
+}
+
+
+@pytest.mark.parametrize(("command", "kind"), list(product(commands(""), KINDS)))
+def test_what_is_no_file_of_text_is_an_error(tmp_path: Path, command: str, kind: str) -> None:
+    (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
+    suffix = ".log" if command == "replay" else ".xml"
+    model(tmp_path)
+    KINDS[kind](tmp_path / f"input{suffix}")
+    result = canopy(*commands(f"input{suffix}")[command], cwd=tmp_path)
+    assert result.returncode in (1, 2), result.stdout
+    assert b"Traceback" not in result.stderr and result.stderr.count(b"input.") >= 1, result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def model(folder: Path) -> Path:
+    """A model file and its DBC, for the commands that want one."""
+    nao = ROOT / "examples" / "nao"
+    arguments = ["compile", str(nao / "trees" / "get_home.xml"), "--dbc", str(nao / "nao.dbc"), "--node", "Controller"]
+    made = folder / "made"
+    result = CliRunner().invoke(main, [*arguments, "--period-ms", "50", "--name", "room", "-o", str(made)])
+    assert result.exit_code == 0, result.output
+    for name in ("room.model.json", "nao.dbc"):
+        shutil.copy(made / name, folder / name)
+    return folder / "room.model.json"
+
+
+@pytest.mark.parametrize("command", commands(""))
+def test_a_name_that_is_not_utf8_is_an_error(tmp_path: Path, command: str) -> None:
+    name = b"in\xffput.log" if command == "replay" else b"in\xffput.xml"
+    (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
+    model(tmp_path)
+    with open(os.fsencode(tmp_path) + b"/" + name, "wb") as file:
+        file.write((tmp_path / "main.xml").read_bytes())
+    result = canopy(*commands(name)[command], cwd=tmp_path)
+    assert result.returncode in (1, 2)
+    assert b"is not UTF-8; rename it" in result.stderr and b"in\\xffput" in result.stderr, result.stderr
+
+
+@pytest.mark.parametrize("option", ["-o", "--depfile", "--stubs", "--name", "--include", "--main-tree", "--type-map"])
+def test_an_argument_that_is_not_utf8_is_an_error(tmp_path: Path, option: str) -> None:
+    (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
+    more = [] if option == "-o" else ["-o", "out"]
+    base = ["compile", "main.xml", "--dbc", DBC, "--node", "Controller", "--period-ms", "10", *more]
+    result = canopy(*base, option, b"x\xff.c", cwd=tmp_path)
+    assert result.returncode == 2
+    assert b"Traceback" not in result.stderr and b"\\xff" in result.stderr, result.stderr
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / "main.xml"]
+
+
+def test_a_dbc_is_in_utf8_or_in_windows_1252(tmp_path: Path) -> None:
+    head = 'VERSION ""\nBU_: Controller B\nBO_ 1 A: 8 B\n'
+    for text, unit in (
+        ("°C".encode(), "°C"),
+        ("°C".encode("cp1252"), "°C"),
+        ("\ufeff" + "Á", "Á"),
+        (b"\x81\x9d", None),
+    ):
+        data = text if isinstance(text, bytes) else "Á".encode()
+        (tmp_path / "bus.dbc").write_bytes(head.encode() + b' SG_ X : 0|8@1+ (1,0) [0|1] "' + data + b'" Controller\n')
+        result = CliRunner().invoke(main, ["codec", str(tmp_path / "bus.dbc"), "-o", str(tmp_path)])
+        if unit is None:
+            assert result.exit_code == 2 and "bus.dbc:4: error: byte 0x81 is no character" in result.stderr
+        else:
+            assert f"[{unit}]" in (tmp_path / "bus_codec.h").read_text(encoding="utf-8"), result.output
+
+
+SUBTREE = '<SubTree ID="B{}"/>'
+LONG = "ba" * MEGABYTE
+
+# One megabyte, or two thousand files, that took minutes: each part is looked up, copied or asked about again and again.
+SLOW = {
+    "text": TREE.format("<AlwaysSuccess>" + "x\n" * (MEGABYTE // 2) + "</AlwaysSuccess>", ""),
+    "text between": TREE.format("<Sequence>" + "xy<AlwaysSuccess/>" * (MEGABYTE // 18) + "</Sequence>", ""),
+    "models": TREE.format(
+        "<AlwaysSuccess/>",
+        "<TreeNodesModel>"
+        + "".join(f'<Condition ID="C{i}"/>' for i in range(MEGABYTE // 25))
+        + "</TreeNodesModel>",
+    ),
+    "ports": TREE.format(
+        "<A/>",
+        '<TreeNodesModel><Action ID="A">'
+        + "".join(f'<input_port name="p{i}" type="int" default="1"/>' for i in range(MEGABYTE // 50))
+        + "</Action></TreeNodesModel>",
+    ),
+    "trees": TREE.format(
+        "<AlwaysSuccess/>",
+        "".join(f'<BehaviorTree ID="T{i}"><AlwaysSuccess/></BehaviorTree>' for i in range(MEGABYTE // 55)),
+    ),
+    "trees of trees": TREE.format(
+        "<AlwaysSuccess/>",
+        "".join(
+            f'<BehaviorTree ID="B{i}"><Sequence>{SUBTREE.format(i + 1) * 2}</Sequence></BehaviorTree>'
+            for i in range(20)
+        )
+        + '<BehaviorTree ID="B20"><AlwaysSuccess/></BehaviorTree>'
+        + "".join(f'<BehaviorTree ID="R{i}"><SubTree ID="B0"/></BehaviorTree>' for i in range(MEGABYTE // 60)),
+    ),
+    "entries": TREE.format(
+        "<Sequence>" + "".join(f'<Script code="a{i}:=a{i + 1}"/>' for i in range(10_000))
+        + '<Script code="a10000:=1"/></Sequence>', ""
+    ),
+    "readers": TREE.format(
+        "<Sequence>" + '<ScriptCondition code="x==1"/>' * (MEGABYTE // 40) + '<Script code="x:=1"/></Sequence>', ""
+    ),
+    "a name": TREE.format(f"<{'ab' * (MEGABYTE // 2)}/>", f'<TreeNodesModel><Action ID="{LONG}"/></TreeNodesModel>'),
+    "blanks": "\n" * MEGABYTE + TREE.format("<AlwaysSuccess/>", "") + "\n" * MEGABYTE,
+    "includes": TREE.format("<AlwaysSuccess/>", "".join(f'<include path="i{i}.xml"/>' for i in range(2_000))),
+    "a chain of includes": TREE.format("<AlwaysSuccess/>", '<include path="c0.xml"/>'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SLOW)
+def test_a_megabyte_takes_seconds(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "main.xml").write_text(SLOW[kind])
+    for i in range(2_000 if "includes" in kind else 0):
+        (tmp_path / f"i{i}.xml").write_text(f'{HEAD}<TreeNodesModel><Condition ID="C{i}"/></TreeNodesModel></root>')
+        (tmp_path / f"c{i}.xml").write_text(f'{HEAD}<include path="c{i + 1}.xml"/></root>')
+    (tmp_path / "c2000.xml").write_text(f"{HEAD}</root>")
+    more = ["--dbc", str(DBC), "--node", "Controller", "--period-ms", "10", "-o", "out"]
+    for arguments in (["check", "main.xml"], ["compile", "main.xml", *more], ["show", "main.xml"], ["fmt", "main.xml"]):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        result = canopy(*arguments, cwd=tmp_path, seconds=100)
+        seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+        assert b"Traceback" not in result.stderr
+        assert len(result.stderr) < 20_000 or kind == "trees"
+        print(f"{kind}: {arguments[0]} {seconds:.1f} s")
+        assert seconds < 25, arguments
+
+
+def test_entities_are_refused_before_they_grow(tmp_path: Path) -> None:
+    entities = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10 if i else "x" * 10}">' for i in range(12))
+    (tmp_path / "main.xml").write_text(f"<!DOCTYPE a [{entities}]><root>&e11;</root>")
+    for command in (["check", "main.xml"], ["fmt", "main.xml"]):
+        start = time.monotonic()
+        result = canopy(*command, cwd=tmp_path)
+        assert result.returncode == 2 and b"main.xml:1:1" in result.stderr and b"DOCTYPE" in result.stderr
+        assert time.monotonic() - start < 10
+
+
+def test_a_device_is_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
+    (tmp_path / "null").symlink_to("/dev/null")
+    result = canopy("show", "main.xml", "--svg", "null", cwd=tmp_path)
+    assert result.returncode == 2 and b"is a device, not a file" in result.stderr
+    assert Path("/dev/null").is_char_device() and (tmp_path / "null").is_symlink()
+
+
+def test_the_bounds_of_reading(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(b"12345")
+    assert read_bytes(file, 5) == b"12345"
+    with pytest.raises(FileError, match="has 5 bytes; at most 4 are read"):
+        read_bytes(file, 4)
+    with pytest.raises(FileError, match="has 11 bytes; at most 10"):  # of size 0, as the kernel says
+        read_bytes(Path("/proc/self/maps"), 10)
+    file.write_bytes(b"a\nb\xff")
+    with pytest.raises(FileError, match="line 2: byte 0xff is not UTF-8"):
+        read_text(file)
+
+
+# The set of generated files.
+
+OLD, NEW = "FAILURE", "SUCCESS"
+
+
+def source(folder: Path, kind: str) -> list[str]:
+    """The arguments to compile a tree; both kinds give other C in every file."""
+    stale = f'<Metadata reads="Climate" stale="{kind}"/>'
+    leaf = f'<Condition ID="IsWarm{kind}"><MetadataFields>{stale}</MetadataFields></Condition>'
+    (folder / "room.xml").write_text(TREE.format(f"<IsWarm{kind}/>", f"<TreeNodesModel>{leaf}</TreeNodesModel>"))
+    name = "Celsius" if kind == OLD else "Kelvin"
+    (folder / "room.dbc").write_text(
+        'VERSION ""\nBU_: Controller B\nBO_ 256 Climate: 2 B\n'
+        f' SG_ {name} : 0|16@1- (0.1,0) [-40|120] "{name}" Controller\n'
+        'BA_DEF_ BO_ "GenMsgCycleTime" INT 0 60000;\nBA_DEF_DEF_ "GenMsgCycleTime" 100;\n'
+    )
+    return ["compile", str(folder / "room.xml"), "--dbc", str(folder / "room.dbc"), "--node", "Controller",
+            "--period-ms", "100", "-o", str(folder / "out"), "--depfile", str(folder / "out" / "room.d")]  # fmt: skip
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted((folder / "out").iterdir())}
+
+
+def compiles(folder: Path) -> bool:
+    """Do all C files of the set compile?"""
+    include = [f"-I{ROOT / 'runtime' / 'include'}", f"-I{folder / 'out'}"]
+    files = sorted((folder / "out").glob("*.c"))
+    command = ["gcc", "-std=c11", *WARNINGS, *include, "-fsyntax-only", *map(str, files)]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+@pytest.fixture
+def sets(tmp_path: Path) -> tuple[dict[str, bytes], dict[str, bytes]]:
+    """The old set, and the new one; the old one is there, and the sources are the new ones."""
+    made = []
+    for kind in (NEW, OLD):
+        result = CliRunner().invoke(main, source(tmp_path, kind))
+        assert result.exit_code == 0, result.output
+        assert compiles(tmp_path)
+        made.append(content(tmp_path))
+    source(tmp_path, NEW)
+    return made[1], made[0]
+
+
+def test_files_of_two_runs_do_not_compile_together(tmp_path: Path, sets: tuple[dict[str, bytes], ...]) -> None:
+    old, new = sets
+    names = [name for name in old if name.endswith((".c", ".h"))]
+    assert len(names) == 5
+    for chosen in product((old, new), repeat=len(names)):
+        for name, kind in zip(names, chosen, strict=True):
+            (tmp_path / "out" / name).write_bytes(kind[name])
+        assert compiles(tmp_path) == (all(kind is old for kind in chosen) or all(kind is new for kind in chosen))
+
+
+@pytest.mark.parametrize("call", ["write", "fsync", "replace", "link", "fchmod", "open"])
+def test_an_error_at_any_step_leaves_the_old_set(
+    tmp_path: Path, sets: tuple[dict[str, bytes], ...], call: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new = sets
+    for failing in count(1):
+        with monkeypatch.context() as patch:
+            calls = _fail_at(patch, call, failing)
+            result = CliRunner().invoke(main, source(tmp_path, NEW))
+        if len(calls) < failing:
+            break
+        assert isinstance(result.exception, SystemExit) and result.exit_code == 2, (failing, result.exception)
+        assert "cannot be written: No space left on device" in result.stderr
+        assert content(tmp_path) == old, failing
+    assert failing > 8
+    assert content(tmp_path) == new
+
+
+def _fail_at(patch: pytest.MonkeyPatch, call: str, failing: int) -> list[object]:
+    """The call number `failing` of canopy.files has no room on the disk; returns the list of all calls."""
+    calls: list[object] = []
+    real = {"write": os.fdopen, "open": os.open}.get(call) or getattr(os, call)
+
+    def fake(*arguments: object, **more: object) -> object:
+        target = str(arguments[0])
+        if call == "open" and ".canopy-" not in target:
+            return real(*arguments, **more)
+        if call == "write" and arguments[1:2] != ("wb",):
+            return real(*arguments, **more)
+        calls.append(arguments)
+        if len(calls) == failing:
+            if call == "write":
+                os.close(arguments[0])  # type: ignore[arg-type]
+            raise OSError(28, "No space left on device")
+        return real(*arguments, **more)
+
+    name = "fdopen" if call == "write" else call
+    patch.setattr(f"os.{name}", fake)
+    return calls
+
+
+KILLED = """
+import os, sys
+from canopy.cli import main
+left = int(sys.argv[1])
+def count(real):
+    def counted(*arguments, **more):
+        global left
+        left -= 1
+        if left == 0:
+            os.kill(os.getpid(), 9)
+        return real(*arguments, **more)
+    return counted
+for name in ("replace", "link", "fsync"):
+    setattr(os, name, count(getattr(os, name)))
+main(sys.argv[2:])
+"""
+
+
+def test_a_program_that_is_killed_at_any_step_leaves_no_set_of_both(
+    tmp_path: Path, sets: tuple[dict[str, bytes], ...]
+) -> None:
+    """At each step: the old set, the new one, or files that do not compile; and the next run makes the new set."""
+    old, new = sets
+    seen = set()
+    for step in count(1):
+        for name, data in old.items():
+            (tmp_path / "out" / name).write_bytes(data)
+        arguments = source(tmp_path, NEW)
+        result = subprocess.run([sys.executable, "-c", KILLED, str(step), *arguments], capture_output=True, check=False)
+        if result.returncode == 0:
+            break
+        assert result.returncode == -9, result.stderr
+        left = {name: data for name, data in content(tmp_path).items() if not name.startswith(".canopy-")}
+        assert sorted(left) == sorted(old)
+        kind = "old" if left == old else "new" if left == new else "mixed"
+        seen.add(kind)
+        c_files = [name for name in old if name.endswith((".c", ".h"))]
+        whole = any(all(left[name] == one[name] for name in c_files) for one in sets)
+        assert compiles(tmp_path) == whole, step
+        # A build looks at this file: it is the last to be new, so that the next build makes all of them again.
+        assert left["room_app.c"] == old["room_app.c"] or left == new, step
+        for name in content(tmp_path).keys() - old.keys():
+            (tmp_path / "out" / name).unlink()
+    assert seen == {"old", "new", "mixed"}
+    assert content(tmp_path) == new
+
+
+def test_a_full_disk_leaves_the_old_set(tmp_path: Path, sets: tuple[dict[str, bytes], ...]) -> None:
+    old, new = sets
+    for room in range(0, max(map(len, new.values())), 500):
+        limit = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room})); "
+        program = limit + "import sys; from canopy.cli import main; main(sys.argv[1:])"
+        arguments = source(tmp_path, NEW)
+        result = subprocess.run(
+            [sys.executable, "-B", "-c", program, *arguments], capture_output=True, text=True, check=False
+        )
+        assert result.returncode == 2 and "cannot be written: File too large" in result.stderr, (room, result.stderr)
+        assert content(tmp_path) == old
+
+
+def test_what_must_be_new_is_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "b").write_text("mine")
+    with pytest.raises(FileExistsError):
+        write_files({tmp_path / "a": b"1", tmp_path / "b": b"2"}, new=[tmp_path / "b"])
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"b": "mine"}
+
+
+def test_the_tools_refuse_a_model_and_a_dbc_of_two_runs(tmp_path: Path) -> None:
+    path = model(tmp_path)
+    assert load_database(load_model(path)) is not None
+    with (tmp_path / "nao.dbc").open("a") as file:
+        file.write("\n")
+    with pytest.raises(ModelError, match=r"is not the DBC that room\.model\.json was written with"):
+        Watch(load_model(path))
