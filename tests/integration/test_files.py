@@ -171,6 +171,9 @@ SLOW = {
         "<Sequence>" + '<ScriptCondition code="x==1"/>' * (MEGABYTE // 40) + '<Script code="x:=1"/></Sequence>', ""
     ),
     "a name": TREE.format(f"<{'ab' * (MEGABYTE // 2)}/>", f'<TreeNodesModel><Action ID="{LONG}"/></TreeNodesModel>'),
+    "an ID": TREE.format(f'<Action ID="{LONG}"/>', f'<TreeNodesModel><Action ID="{LONG}"/></TreeNodesModel>').replace(
+        LONG, LONG.upper()
+    ),
     "blanks": "\n" * MEGABYTE + TREE.format("<AlwaysSuccess/>", "") + "\n" * MEGABYTE,
     "includes": TREE.format("<AlwaysSuccess/>", "".join(f'<include path="i{i}.xml"/>' for i in range(2_000))),
     "a chain of includes": TREE.format("<AlwaysSuccess/>", '<include path="c0.xml"/>'),
@@ -193,6 +196,28 @@ def test_a_megabyte_takes_seconds(tmp_path: Path, kind: str) -> None:
         assert len(result.stderr) < 20_000 or kind == "trees"
         print(f"{kind}: {arguments[0]} {seconds:.1f} s")
         assert seconds < 25, arguments
+
+
+BUS = 'VERSION ""\nBU_: Controller B\nBO_ 1 {}: 8 B\n SG_ X : 0|32@1+ (1,0) [0|0] "{}" Controller\n{}'
+SLOW_BUSES = {
+    "names of values": BUS.format("M", "", "VAL_ 1 X " + "".join(f'{i} "c" ' for i in range(MEGABYTE // 12)) + ";\n"),
+    "a name": BUS.format("M" * MEGABYTE, "", ""),
+    "a unit": BUS.format("M", "u" * MEGABYTE, ""),
+    "a comment": BUS.format("M", "", 'CM_ BO_ 1 "' + "word\n" * (MEGABYTE // 5) + '";\n'),
+    "multiplexed signals": BUS.format("M", "", "").replace("X :", "X M :")
+    + "".join(f' SG_ X{i} m{i} : 32|8@1+ (1,0) [0|255] "" Controller\n' for i in range(MEGABYTE // 50)),
+}
+
+
+@pytest.mark.parametrize("kind", SLOW_BUSES)
+def test_a_megabyte_of_a_bus_takes_seconds(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "bus.dbc").write_text(SLOW_BUSES[kind])
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    result = canopy("codec", "bus.dbc", "-o", "out", cwd=tmp_path, seconds=100)
+    assert b"Traceback" not in result.stderr
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 25
+    if kind == "multiplexed signals":
+        assert b"message 'M' has more than 2048 signals" in result.stderr
 
 
 def test_entities_are_refused_before_they_grow(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.files import FileError, read_bytes
 
 MAX_BYTES = 16 * 1024 * 1024
+MAX_SIGNALS = 2_048  # of a message
 MAX_MESSAGE_BYTES = 1785  # of J1939's transport protocol
 _MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:\s*(\d+)")
 
@@ -63,7 +64,7 @@ def load_dbc(path: Path) -> Any:
     """
     place = Place(str(path))
     text = decode_dbc(read_dbc(path))
-    _check_lengths(path, text)
+    _check_sizes(path, text)
     try:
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
         database = cantools.database.load_string(text, database_format="dbc", strict=True)
@@ -75,16 +76,19 @@ def load_dbc(path: Path) -> Any:
     return database
 
 
-def _check_lengths(path: Path, text: str) -> None:
-    """Refuses messages longer than any protocol's: cantools takes memory and time for each bit of them."""
+def _check_sizes(path: Path, text: str) -> None:
+    """Refuses messages that nobody sends: cantools takes time for each bit of them, and for each pair of signals."""
+    name, signals = "", 0
     for line_number, line in enumerate(text.splitlines(), 1):
+        place = Place(str(path), line_number)
         found = _MESSAGE_LENGTH.match(line)
-        if found is not None and (len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES):
-            raise CompileError(
-                Place(str(path), line_number),
-                f"message '{found[1]}' is longer than {MAX_MESSAGE_BYTES} bytes",
-                "CAN FD has 64",
-            )
+        if found is not None:
+            name, signals = found[1], 0
+            if len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES:
+                raise CompileError(place, f"message '{name}' is longer than {MAX_MESSAGE_BYTES} bytes", "CAN FD has 64")
+        signals += line.lstrip().startswith("SG_ ")
+        if signals > MAX_SIGNALS:
+            raise CompileError(place, f"message '{name}' has more than {MAX_SIGNALS} signals")
 
 
 def _check_unique(place: Place, database: Any) -> None:
