@@ -107,7 +107,17 @@ def test_a_name_that_is_not_utf8_is_an_error(tmp_path: Path, command: str) -> No
 def test_an_argument_that_is_not_utf8_is_an_error(tmp_path: Path, option: str) -> None:
     (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
     more = [] if option == "-o" else ["-o", "out"]
-    base = ["compile", "main.xml", "--dbc", DBC, "--node", "Controller", "--period-ms", "10", *more]
+    base: list[str | bytes | Path] = [
+        "compile",
+        "main.xml",
+        "--dbc",
+        DBC,
+        "--node",
+        "Controller",
+        "--period-ms",
+        "10",
+        *more,
+    ]
     result = canopy(*base, option, b"x\xff.c", cwd=tmp_path)
     assert result.returncode == 2
     assert b"Traceback" not in result.stderr and b"\\xff" in result.stderr, result.stderr
@@ -327,7 +337,8 @@ def test_an_error_at_any_step_leaves_the_old_set(
 def _fail_at(patch: pytest.MonkeyPatch, call: str, failing: int) -> list[object]:
     """The call number `failing` of canopy.files has no room on the disk; returns the list of all calls."""
     calls: list[object] = []
-    real = {"write": os.fdopen, "open": os.open}.get(call) or getattr(os, call)
+    name = "fdopen" if call == "write" else call
+    real = getattr(os, name)
 
     def fake(*arguments: object, **more: object) -> object:
         target = str(arguments[0])
@@ -342,7 +353,6 @@ def _fail_at(patch: pytest.MonkeyPatch, call: str, failing: int) -> list[object]
             raise OSError(28, "No space left on device")
         return real(*arguments, **more)
 
-    name = "fdopen" if call == "write" else call
     patch.setattr(f"os.{name}", fake)
     return calls
 
