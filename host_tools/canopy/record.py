@@ -18,7 +18,6 @@ from can.interfaces.socketcan import SocketcanBus
 from canopy.canbus import CanBusError, is_plain_data, open_bus, receive_losses, split_spec
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import Styled, echo
-from canopy.files import FileError, check_file
 from canopy.model import Model, ModelError, load_model
 from canopy.stop import StopFlag
 from canopy.trace import TraceDecoder, TreeView
@@ -154,7 +153,6 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
     if path.suffix.lower() not in SUFFIXES:
         raise RecordError(f"{path}: the suffix says the format, and must be one of {', '.join(SUFFIXES)}")
     try:
-        check_file(path)
         with path.open("wb" if force else "xb"):  # can.Logger would overwrite without a word
             pass
         writer = can.Logger(path)
@@ -162,8 +160,6 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
         raise RecordError(f"{path}: is there already; give another name, or --force to overwrite it") from None
     except OSError as error:
         raise RecordError(f"{path}: cannot be written: {error.strerror}") from error
-    except FileError as error:
-        raise RecordError(str(error)) from error
     assert isinstance(writer, can.io.generic.MessageWriter)
     try:
         yield writer

@@ -177,6 +177,21 @@ SLOW = {
         "<Sequence>" + "".join(f'<Script code="a{i}:=a{i + 1}"/>' for i in range(10_000))
         + '<Script code="a10000:=1"/></Sequence>', ""
     ),
+    "deep": TREE.format("<Sequence><AlwaysSuccess/>" * 30_000 + "<AlwaysSuccess/>" + "</Sequence>" * 30_000, ""),
+    "clean-ups": TREE.format(
+        "<Sequence>" + "".join(f"<A{i}/>" for i in range(8_000)) + "</Sequence>",
+        "<TreeNodesModel>"
+        + "".join(
+            f'<Action ID="A{i}"><MetadataFields><Metadata undoes="A{i + 1}"/></MetadataFields></Action>'
+            for i in range(8_000)
+        )
+        + "</TreeNodesModel>",
+    ),
+    "guards": TREE.format(
+        "<ReactiveSequence>" + "<C/>" * 20_000 + "</ReactiveSequence>",
+        '<TreeNodesModel><Condition ID="C"><MetadataFields><Metadata reads="Climate"/></MetadataFields></Condition>'
+        "</TreeNodesModel>",
+    ),
     "readers": TREE.format(
         "<Sequence>" + '<ScriptCondition code="x==1"/>' * (MEGABYTE // 40) + '<Script code="x:=1"/></Sequence>', ""
     ),

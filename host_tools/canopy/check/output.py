@@ -12,6 +12,7 @@ from canopy.check.registry import Rule, Severity
 from canopy.check.run import Finding, Report
 from canopy.escape.json_text import sarif_message
 from canopy.escape.terminal import echo, style
+from canopy.escape.visible import brief
 
 JSON_FORMAT = 1
 SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -38,9 +39,9 @@ def print_text(report: Report, *, quiet: bool = False) -> None:
     for finding in report.findings:
         severity = finding.rule.severity
         word = style(severity.label, fg=_COLOURS[severity], bold=True)
-        echo(f"{finding.place}: ", word, f": {finding.message} [{finding.rule.id}]")
+        echo(f"{finding.place}: ", word, f": {brief(finding.message)} [{finding.rule.id}]")
         if not quiet:
-            echo(f"  help: {finding.help_text}")
+            echo(f"  help: {brief(finding.help_text)}")
     echo(summary(report))
 
 

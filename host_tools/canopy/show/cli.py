@@ -12,12 +12,22 @@ from canopy.compiler.cli import main_tree_option, package_option, read_packages
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.output import fail
 from canopy.compiler.port_types import ANY_TYPE
-from canopy.compiler.tree_reader import read_tree
+from canopy.compiler.tree_reader import Tree, read_tree
 from canopy.escape.terminal import echo_lines
 from canopy.files import FileError, write_files
 from canopy.show.dot import dot
+from canopy.show.order import in_order
 from canopy.show.svg import svg
 from canopy.show.terminal import print_tree
+
+MOST_CELLS = 10_000_000
+
+
+def _check_size(tree: Tree) -> None:
+    """A drawing has a column for each level, and takes time and room for each node in it."""
+    cells = sum(depth for _, _, depth in in_order(tree.root))
+    if cells > MOST_CELLS:
+        raise CompileError(tree.root.place, "the tree is too deep to be drawn", "draw a part of it: --main-tree")
 
 
 def _write(target: str, text: str) -> None:
@@ -58,6 +68,7 @@ def command(
     """
     try:
         checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages), main_tree=main_tree))
+        _check_size(checked)
     except CompileError as error:
         fail(error)
     if svg_file is not None:
