@@ -10,7 +10,7 @@ SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
 # Of check-all, which judges every change by the same random trees. `make test-differential` takes new ones each time.
 SEED := 20261123
-PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc
+PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
@@ -104,7 +104,7 @@ proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any inp
 	$(SETUP)/make-venv can
 	$(PYTHON) tests/proof/run.py
 
-bench: ## instructions, stack and memory of a tick, next to other engines; rewrites the tables of docs/benchmarks.md
+bench: ## instructions, stack and memory of a tick, instructions of cycles, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench
 	$(SETUP)/make-venv can,lcm,test,differential,bench
 	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md

@@ -19,8 +19,11 @@ static uint32_t at_most16(uint32_t value)
 
 static void send(canopy_trace_state_t *self, const canopy_can_t *can, canopy_trace_id_t id, const uint8_t data[8])
 {
-    canopy_can_frame_t frame = {.id = id.id, .flags = id.flags, .length = 8};
+    canopy_can_frame_t frame; /* not all zero: the other 56 bytes are nobody's */
 
+    frame.id = id.id;
+    frame.flags = id.flags;
+    frame.length = 8;
     for (unsigned byte = 0; byte < 8u; byte++) {
         frame.data[byte] = data[byte];
     }
@@ -90,8 +93,8 @@ static void send_changes(const canopy_trace_config_t *config, canopy_trace_state
     uint16_t pair[2] = {NO_NODE, NO_NODE};
     unsigned filled = 0;
 
-    for (uint16_t node = 0; node < tree->tree->node_count; node++) {
-        if (self->sent[node] == tree->status[node] || changes == 0u) {
+    for (uint16_t node = 0; node < tree->tree->node_count && changes > 0u; node++) {
+        if (self->sent[node] == tree->status[node]) {
             continue;
         }
         self->sent[node] = tree->status[node];

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Counts instructions and stack on an emulated Cortex-M4 (unicorn)."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,7 +42,7 @@ class Core:
 
     def build(self, workload: int, n: int) -> int:
         """Calls bench_build(). Returns the number of nodes."""
-        return self._call("bench_build", workload, n)
+        return self.call("bench_build", workload, n)
 
     def tick(self, now: int, count: bool = True) -> Tick:
         """Calls canopy_tree_tick() at `now` [us].
@@ -61,11 +62,11 @@ class Core:
             nonlocal instructions
             instructions += 1
 
-        hooks = [self._machine.hook_add(unicorn.UC_HOOK_BLOCK, block)]
+        hooks = [self._hook(unicorn.UC_HOOK_BLOCK, block)]
         if count:
-            hooks.append(self._machine.hook_add(unicorn.UC_HOOK_CODE, step))
+            hooks.append(self._hook(unicorn.UC_HOOK_CODE, step))
         # AAPCS: a 64-bit argument takes an even pair of registers, here r2 and r3.
-        self._call("canopy_tree_tick", self._symbols["bench_instance"], 0, now & 0xFFFF_FFFF, now >> 32)
+        self.call("canopy_tree_tick", self._symbols["bench_instance"], 0, now & 0xFFFF_FFFF, now >> 32)
         for hook in hooks:
             self._machine.hook_del(hook)
         return Tick(instructions, self._word("bench_leaf_calls") - calls, STACK_TOP - lowest)
@@ -78,10 +79,34 @@ class Core:
             nonlocal instructions
             instructions += 1
 
-        hook = self._machine.hook_add(unicorn.UC_HOOK_CODE, step)
-        result = self._call(function, *arguments)
+        hook = self._hook(unicorn.UC_HOOK_CODE, step)
+        result = self.call(function, *arguments)
         self._machine.hook_del(hook)
         return result, instructions
+
+    def count_parts(self, function: str, parts: Mapping[str, str], *arguments: int) -> dict[str, int]:
+        """Calls a function. Returns the instructions of the whole of it, as "whole", and of its parts.
+
+        `parts` names functions: function -> part. A part's instructions are those of its functions with all that they
+        call; one that is called within another counts for both.
+        """
+        entries = {self._symbols[name] & ~1: part for name, part in parts.items()}
+        counts = {"whole": 0, **dict.fromkeys(parts.values(), 0)}
+        entered: list[tuple[str, int]] = []  # part, and where it returns to
+
+        def step(machine: unicorn.Uc, address: int, _size: int, _data: object) -> None:
+            while entered and entered[-1][1] == address:
+                entered.pop()
+            if address in entries:
+                entered.append((entries[address], machine.reg_read(arm_const.UC_ARM_REG_LR) & ~1))
+            counts["whole"] += 1
+            for part, _ in entered:
+                counts[part] += 1
+
+        hook = self._hook(unicorn.UC_HOOK_CODE, step)
+        self.call(function, *arguments)
+        self._machine.hook_del(hook)
+        return counts
 
     def address(self, symbol: str) -> int:
         """Where a variable lies."""
@@ -89,7 +114,7 @@ class Core:
 
     def build_stack(self, node_type: int, asked: bool) -> int:
         """Calls bench_stack_build(). Returns the number of nodes."""
-        return self._call("bench_stack_build", node_type, int(asked))
+        return self.call("bench_stack_build", node_type, int(asked))
 
     def worst_stack(self, ticks: int, period_us: int) -> int:
         """The most stack of so many ticks, and of a reset, which halts, after every fifth [bytes].
@@ -102,18 +127,24 @@ class Core:
             nonlocal lowest
             lowest = min(lowest, machine.reg_read(arm_const.UC_ARM_REG_SP))
 
-        hook = self._machine.hook_add(unicorn.UC_HOOK_CODE, step)
+        hook = self._hook(unicorn.UC_HOOK_CODE, step)
         for number in range(ticks):
-            self._call("canopy_tree_tick", self._symbols["bench_instance"], 0, number * period_us, 0)
+            self.call("canopy_tree_tick", self._symbols["bench_instance"], 0, number * period_us, 0)
             if number % 5 == 4:
-                self._call("canopy_tree_reset", self._symbols["bench_instance"])
+                self.call("canopy_tree_reset", self._symbols["bench_instance"])
         self._machine.hook_del(hook)
         return STACK_TOP - lowest
+
+    def _hook(self, kind: int, function: Callable[[unicorn.Uc, int, int, object], None]) -> int:
+        """Adds a hook. What has run without it is translated again: it would go on without."""
+        self._machine.ctl_flush_tb()
+        return int(self._machine.hook_add(kind, function))
 
     def _word(self, symbol: str) -> int:
         return int.from_bytes(self._machine.mem_read(self._symbols[symbol], 4), "little")
 
-    def _call(self, function: str, *arguments: int) -> int:
+    def call(self, function: str, *arguments: int) -> int:
+        """Calls a function with arguments of 32 bit, four at most. Returns its result."""
         for register, value in enumerate(arguments):
             self._machine.reg_write(arm_const.UC_ARM_REG_R0 + register, value)
         self._machine.reg_write(arm_const.UC_ARM_REG_SP, STACK_TOP)

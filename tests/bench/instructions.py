@@ -12,9 +12,13 @@ from pathlib import Path
 TICKS = (2, 12)
 
 
-def collected(command: Sequence[str | Path]) -> tuple[int, str]:
-    """Instructions of a whole run of a program, and what it printed. Raises RuntimeError when it fails."""
-    valgrind = ("valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null")
+def collected(command: Sequence[str | Path], within: Sequence[str] = ()) -> tuple[int, str]:
+    """Instructions of a run of a program, and what it printed. Raises RuntimeError when it fails.
+
+    `within` names functions that do not call each other: only they count, with all that they call.
+    """
+    only = [f"--toggle-collect={function}" for function in within]
+    valgrind = ("valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", *only)
     environment = {**os.environ, "PYTHONHASHSEED": "0"}
     try:
         done = subprocess.run((*valgrind, *command), capture_output=True, text=True, check=False, env=environment)
@@ -22,7 +26,7 @@ def collected(command: Sequence[str | Path]) -> tuple[int, str]:
         raise RuntimeError("valgrind is missing; `make bench` installs it") from error
     found = re.search(r"Collected : (\d+)", done.stderr)
     if done.returncode != 0 or found is None:
-        raise RuntimeError(f"{' '.join(map(str, command))} under callgrind failed:\n{done.stderr}")
+        raise RuntimeError(f"{' '.join(map(str, command))} under callgrind failed:\n{done.stdout}{done.stderr}")
     return int(found[1]), done.stdout
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from canopy.compiler.node_types import node_types
 
-from . import build, cortex_m, image, instructions
+from . import build, cortex_m, cycle, image, instructions
 
 # Workload and n. Instructions per leaf on this machine.
 HOST_ROWS = [
@@ -113,6 +113,21 @@ def _images(folder: Path, say: Progress) -> dict[str, Any]:
     return {target.name: image.measure(target, generated, folder) for target in build.CORTEX_M4}
 
 
+def _cycles(folder: Path, say: Progress) -> dict[str, Any]:
+    """Application -> compiler -> part -> instructions a cycle."""
+    results: dict[str, Any] = {}
+    for application in cycle.APPLICATIONS:
+        generated = cycle.generate(application, folder)
+        columns = results[application.name] = {}
+        for target in build.HOSTS:
+            say(f"{target.name}: cycles of {application.name}")
+            columns[target.name] = cycle.measure_host(cycle.host_program(target, application, generated, folder))
+        for target in build.CORTEX_M4:
+            say(f"{target.name}: cycles of {application.name}")
+            columns[target.name] = cycle.measure_cortex(cycle.bare_program(target, application, generated, folder))
+    return results
+
+
 def _memory(folder: Path) -> dict[str, Any]:
     program = build.host_program(build.HOSTS[0], folder)
     objects = {
@@ -156,6 +171,7 @@ def measure(say: Progress) -> dict[str, Any]:
             "machine": platform.machine(),
             "host": _host(folder, say),
             "cortex_m4": _cortex(folder, say),
+            "cycles": _cycles(folder, say),
             "images": _images(folder, say),
             "memory": _memory(folder),
             "peers": _peers(folder, say),

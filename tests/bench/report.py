@@ -16,6 +16,19 @@ WHAT = {
     "halt_parallel": "ReactiveParallel abandons an action below {n} Sequences",
     "halt_timeout": "Timeout abandons an action below {n} Sequences",
 }
+# The parts of a cycle, and what they are called.
+CYCLE = {
+    "whole": "mean of 100 cycles",
+    "receive": "- check and decode",
+    "begin": "- freshness, safe outputs",
+    "tick": "- tick",
+    "commit": "- commit",
+    "trace": "- trace",
+    "rest": "- loop, clock, driver",
+    "e2e": "- E2E in check and commit",
+    "worst": "longest of them",
+}
+CYCLE_TARGETS = {"nao_power": {"cortex-m4 -O2": {"whole": 2600}}}
 TARGETS = {"sequence 100": "33", "balanced 6": "46"}
 
 # Not to be had from a package registry, so not measured here: quoted from the measurements that set the targets, made
@@ -78,6 +91,29 @@ def _stack(results: dict[str, Any]) -> str:
     return _table(["stack of a tick [bytes]", *columns], rows)
 
 
+def _cycle_cell(name: str, target: str, counts: dict[str, float], part: str) -> str:
+    if part == "rest":
+        value = counts["whole"] - sum(counts[named] for named in ("receive", "begin", "tick", "commit", "trace"))
+    elif part in counts:
+        value = counts[part]
+    else:
+        return ""
+    most = CYCLE_TARGETS.get(name, {}).get(target, {}).get(part)
+    share = f" ({value / counts['whole']:.0%})" if part not in ("whole", "worst") else ""
+    return f"{value:,.0f}" + share + (f" (to reach: {most:,})" if most is not None else "")
+
+
+def _cycles(applications: dict[str, Any], machine: str) -> str:
+    rows = []
+    columns: list[str] = []
+    for name, targets in applications.items():
+        columns = [target if " " in target else f"{machine}, {target} -O2" for target in targets]
+        for part, what in CYCLE.items():
+            cells = [_cycle_cell(name, target, counts, part) for target, counts in targets.items()]
+            rows.append([f"{name}: {what}" if part in ("whole", "worst") else what, *cells])
+    return _table(["instructions per cycle", *columns], rows)
+
+
 def _images(columns: dict[str, Any]) -> str:
     rows = []
     for name, image in next(iter(columns.values())).items():
@@ -119,6 +155,7 @@ def _peers(peers: dict[str, Any]) -> str:
 
 
 def markdown(results: dict[str, Any]) -> str:
-    """The five tables."""
-    tables = (_instructions(results), _stack(results), _images(results["images"]), _memory(results["memory"]))
+    """The six tables."""
+    cycles = _cycles(results["cycles"], results["machine"])
+    tables = (_instructions(results), cycles, _stack(results), _images(results["images"]), _memory(results["memory"]))
     return "\n\n".join((*tables, _peers(results["peers"])))

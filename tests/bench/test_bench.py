@@ -6,12 +6,13 @@ tree.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench import build, image, instructions, measure, report
+from bench import build, cortex_m, cycle, image, instructions, measure, report
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +113,46 @@ def test_loading_an_image_is_counted(tmp_path: Path) -> None:
     assert all(found["instructions"] > 8 * found["bytes"] for found in images.values()), "the CRC takes each bit"
 
 
+@pytest.fixture(scope="module")
+def nao_power(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return cycle.generate(cycle.APPLICATIONS[0], tmp_path_factory.mktemp("cycle"))
+
+
+def test_parts_of_a_cycle_add_up(nao_power: Path, tmp_path: Path) -> None:
+    application = cycle.APPLICATIONS[0]
+    host = cycle.measure_host(cycle.host_program(build.HOSTS[0], application, nao_power, tmp_path))
+    bare = cycle.measure_cortex(cycle.bare_program(build.CORTEX_M4[0], application, nao_power, tmp_path))
+    assert bare.pop("worst") > bare["whole"]
+    for counts in (host, bare):
+        # Two frames of 8 bytes checked, one of 3 bytes protected, each byte in ten instructions or more.
+        assert 2 * 8 * 10 < counts["e2e"] < counts["receive"] + counts["commit"]
+        assert all(count > 0 for count in counts.values())
+        parts = sum(counts[part] for part in ("receive", "begin", "tick", "commit", "trace"))
+        assert 0.7 * counts["whole"] < parts < counts["whole"]
+
+
+def test_a_cycle_that_rejects_a_frame_is_not_measured(tmp_path: Path) -> None:
+    own = {"PowerCommand": {"E2E_CRC": 0, "E2E_Counter": 0, "Mode": 0}}
+    application = replace(cycle.APPLICATIONS[0], frames=own)
+    generated = cycle.generate(application, tmp_path)
+    with pytest.raises(RuntimeError, match="100 frames were lost or rejected"):
+        cycle.measure_cortex(cycle.bare_program(build.CORTEX_M4[0], application, generated, tmp_path))
+    with pytest.raises(RuntimeError, match="failures"):
+        cycle.measure_host(cycle.host_program(build.HOSTS[0], application, generated, tmp_path))
+
+
+def test_what_has_run_uncounted_is_counted_when_it_runs_again(nao_power: Path, tmp_path: Path) -> None:
+    program = cycle.bare_program(build.CORTEX_M4[0], cycle.APPLICATIONS[0], nao_power, tmp_path)
+    counts = []
+    for calls_before in (0, 3):
+        core = cortex_m.Core(program)
+        data = cortex_m.STACK_TOP - 0x1000
+        for _ in range(calls_before):
+            core.call("canopy_e2e_crc", 1, data, 8)
+        counts.append(core.count("canopy_e2e_crc", 1, data, 8))
+    assert counts[0] == counts[1]
+
+
 def test_tables_have_a_cell_for_everything() -> None:
     column = {
         "per_leaf": {"sequence 100": 22.0, "inverters 60000": 60001.0},
@@ -121,11 +162,13 @@ def test_tables_have_a_cell_for_everything() -> None:
     peer = {"version": "1", "per_leaf": {"sequence": 1.0}, "nanoseconds": {"sequence": 1.0}}
     sizes = {"flash_per_node": 12, "ram_per_node": 1, "ram_per_word": 2, "instance": 48}
     memory = {"sizes": sizes, "allocators": 0, "calls_outside": {"gcc": []}, "code_bytes": {"gcc": 1000}}
+    cycle_parts = dict.fromkeys(("whole", *cycle.PARTS), 1.0)
     text = report.markdown(
         {
             "machine": "x86_64",
             "host": {"gcc": column},
             "cortex_m4": {"cortex-m4 -O2": column},
+            "cycles": {"nao_power": {"gcc": cycle_parts, "cortex-m4 -O2": {**cycle_parts, "worst": 2}}},
             "images": {"cortex-m4 -O2": {"main": {"nodes": 22, "bytes": 872, "instructions": 53201}}},
             "memory": memory,
             "peers": {
@@ -138,5 +181,5 @@ def test_tables_have_a_cell_for_everything() -> None:
         }
     )
     tables = [block.splitlines() for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 5
+    assert len(tables) == 6
     assert all(len({line.count("|") for line in table}) == 1 for table in tables)

@@ -61,9 +61,11 @@ static uint8_t hex_byte(const char *text)
 /** What the tests write is well formed; what a driver must refuse (ids and lengths out of range) can be written. */
 static canopy_can_frame_t parse_frame(const char *text)
 {
-    canopy_can_frame_t frame = {0};
+    canopy_can_frame_t frame;
     unsigned flags = 0;
     char *rest = NULL;
+    memset(&frame, 0x5A, sizeof frame); /* what lies behind the data must not reach the bus */
+    frame.length = 0;
     frame.id = (uint32_t)strtoul(text, &rest, 16);
     flags |= rest - text > 3 ? (unsigned)CANOPY_CAN_EXTENDED : 0u;
     rest++;

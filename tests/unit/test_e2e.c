@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file E2E Profile 11: known answers, and the receiver's rule. */
+#include <stdbool.h>
 #include <string.h>
 
 #include "canopy/e2e.h"
@@ -34,6 +35,34 @@ static void protect_gives_the_known_answer(void)
 
     canopy_e2e_protect(DATA_ID, 1, data, LENGTH);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, data, LENGTH);
+}
+
+/** The definition: the polynomial 0x1D, a bit at a time. */
+static uint8_t crc_by_the_bit(uint8_t crc, uint8_t byte)
+{
+    crc ^= byte;
+    for (unsigned bit = 0; bit < 8u; bit++) {
+        crc = (uint8_t)((crc & 0x80u) != 0u ? ((unsigned)crc << 1) ^ 0x1Du : (unsigned)crc << 1);
+    }
+    return crc;
+}
+
+static void the_crc_is_the_definitions_for_every_crc_and_byte(void)
+{
+    bool seen[256] = {false};
+
+    for (unsigned high = 0; high < 256u; high++) {
+        uint8_t before = crc_by_the_bit(crc_by_the_bit(0, 0), (uint8_t)high);
+
+        TEST_ASSERT_FALSE(seen[before]); /* so `before` takes each of the 256 values */
+        seen[before] = true;
+        for (unsigned byte = 0; byte < 256u; byte++) {
+            const uint8_t data[2] = {0, (uint8_t)byte};
+
+            TEST_ASSERT_EQUAL_HEX8(crc_by_the_bit(before, (uint8_t)byte),
+                                   canopy_e2e_crc((uint16_t)(high << 8), data, 2));
+        }
+    }
 }
 
 static void protect_keeps_the_other_half_of_byte_1(void)
@@ -97,6 +126,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(protect_gives_the_known_answer);
+    RUN_TEST(the_crc_is_the_definitions_for_every_crc_and_byte);
     RUN_TEST(protect_keeps_the_other_half_of_byte_1);
     RUN_TEST(frames_in_order_pass_also_across_the_wrap);
     RUN_TEST(a_repeated_frame_is_refused);

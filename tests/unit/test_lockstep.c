@@ -3,6 +3,8 @@
  * @file
  * Lock-step: which frames a tick sees, when time moves, and when a wait ends. The inner driver is a script.
  */
+#include <string.h>
+
 #include "canopy/clock/lockstep.h"
 
 #include "unity.h"
@@ -161,6 +163,18 @@ static void test_the_same_step_again_is_no_new_step(void)
     expect_no_frame();
 }
 
+static void test_what_lies_behind_the_data_makes_no_new_step(void)
+{
+    script(STEP_ID, 4);
+    script(STEP_ID, 4);
+    memset(&inner.script[1].data[1], 0x5A, sizeof inner.script[1].data - 1u);
+    script(STEP_ID, 5);
+
+    TEST_ASSERT_TRUE(wait_until(PERIOD));
+    TEST_ASSERT_TRUE(wait_until(2 * PERIOD));
+    TEST_ASSERT_EQUAL(3, inner.waits);
+}
+
 static void test_a_shorter_step_is_a_new_one(void)
 {
     script(STEP_ID, 4);
@@ -263,6 +277,7 @@ int main(void)
     RUN_TEST(test_a_tick_sees_exactly_the_frames_before_its_step);
     RUN_TEST(test_frames_that_come_one_by_one_are_waited_for);
     RUN_TEST(test_the_same_step_again_is_no_new_step);
+    RUN_TEST(test_what_lies_behind_the_data_makes_no_new_step);
     RUN_TEST(test_a_shorter_step_is_a_new_one);
     RUN_TEST(test_frames_of_other_formats_with_the_step_id_are_no_steps);
     RUN_TEST(test_time_never_goes_back_and_a_late_tick_still_needs_a_step);

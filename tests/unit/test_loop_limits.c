@@ -226,6 +226,88 @@ static void a_cycle_that_ends_when_the_one_after_the_next_is_due_leaves_out_one(
     TEST_ASSERT_EQUAL_UINT64(2u * PERIOD_US, loop.deadline);
 }
 
+/** One cycle, due at `due`, ends at `end`; how long the account takes may not depend on how much is missed. */
+static void end_late(canopy_time_t due, canopy_time_t end)
+{
+    reading = 0;
+    cycles_left = 1;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    loop.deadline = due;
+    readings[reading] = due;
+    readings[reading + 1u] = end;
+    (void)canopy_loop_step(&loop);
+}
+
+static void a_sleep_of_hours_costs_no_more_than_one_of_a_period(void)
+{
+    const canopy_time_t sleep = UINT64_C(8) * 3600u * 1000000u;
+
+    app.period = 10000;
+    end_late(0, sleep);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.overruns);
+    TEST_ASSERT_EQUAL_UINT32(8u * 3600u * 100u - 1u, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(sleep, loop.deadline);
+    end_late(123, sleep); /* the phase is kept */
+    TEST_ASSERT_EQUAL_UINT32(8u * 3600u * 100u - 1u, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(sleep + 123u, loop.deadline);
+    end_late(123, sleep + 124u);
+    TEST_ASSERT_EQUAL_UINT32(8u * 3600u * 100u, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(sleep + 10123u, loop.deadline);
+}
+
+static void slips_are_counted_across_the_wrap_of_time(void)
+{
+    const canopy_time_t due = UINT64_MAX - 10499u;
+
+    end_late(due, due + 10500u); /* 0: the count has begun again */
+    TEST_ASSERT_EQUAL_UINT32(10, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(due + 11000u, loop.deadline);
+    TEST_ASSERT_EQUAL_UINT64(500, loop.deadline);
+}
+
+/** As many as can be told apart from a time that is yet to come: centuries. It would take hours to go through them. */
+static void more_slips_than_can_be_counted_stay_at_the_largest_value(void)
+{
+    const canopy_time_t longest = (UINT64_C(1) << 63) - 1u;
+
+    app.period = 1;
+    end_late(0, longest + 1u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(longest + 1u, loop.deadline);
+    end_late(0, UINT64_C(1) << 32);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, loop.slips); /* exactly */
+    end_late(0, (UINT64_C(1) << 32) - 1u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX - 1u, loop.slips);
+    loop.deadline = 0;
+    loop.slips = UINT32_MAX - 1u;
+    reading = 0;
+    readings[1] = 3;
+    (void)canopy_loop_step(&loop);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, loop.slips);
+    TEST_ASSERT_EQUAL_UINT64(3, loop.deadline);
+}
+
+/** The account by its definition: each deadline that is past when the cycle ends is one slip. */
+static void slips_are_those_of_the_definition(void)
+{
+    for (canopy_time_t period = 1; period <= 7u; period++) {
+        app.period = period;
+        for (canopy_time_t end = 0; end < 60u; end++) {
+            canopy_time_t due = 5u + period;
+            uint32_t past = 0;
+
+            while (due < end) {
+                due += period;
+                past++;
+            }
+            end_late(5, end < 5u ? 5u : end);
+            TEST_ASSERT_EQUAL_UINT32(past, loop.slips);
+            TEST_ASSERT_EQUAL_UINT64(due, loop.deadline);
+            TEST_ASSERT_EQUAL_UINT32(past > 0u ? 1u : 0u, loop.overruns);
+        }
+    }
+}
+
 static void a_very_late_start_is_in_the_last_bucket(void)
 {
     cycles_left = 1;
@@ -270,6 +352,10 @@ int main(void)
     RUN_TEST(the_hook_after_a_cycle_can_end_the_loop);
     RUN_TEST(a_cycle_longer_than_32_bits_is_told_as_the_largest);
     RUN_TEST(a_cycle_that_ends_when_the_one_after_the_next_is_due_leaves_out_one);
+    RUN_TEST(a_sleep_of_hours_costs_no_more_than_one_of_a_period);
+    RUN_TEST(slips_are_counted_across_the_wrap_of_time);
+    RUN_TEST(more_slips_than_can_be_counted_stay_at_the_largest_value);
+    RUN_TEST(slips_are_those_of_the_definition);
     RUN_TEST(a_very_late_start_is_in_the_last_bucket);
     RUN_TEST(counters_stay_at_their_largest_value);
     return UNITY_END();

@@ -58,7 +58,7 @@ static canopy_error_t open_files(const char *to)
 static void test_frames_come_and_go_as_they_are(void)
 {
     const canopy_can_t *can = &files.replay.can;
-    canopy_can_frame_t frame;
+    canopy_can_frame_t frame; /* its bytes behind the data are never written: nor may they be in the file */
     uint8_t written[sizeof sensor + 1u];
     FILE *file;
 

@@ -193,6 +193,32 @@ static void test_datagram_is_the_one_of_the_documentation(void)
     (void)close(peer);
 }
 
+/* What lies in the frame behind its data, or in a remote frame's data, was never written, or is of an older frame. */
+static void test_nothing_but_the_data_reaches_the_bus(void)
+{
+    static const uint8_t data[] = {0x01, 0x00, 0x02, 0x00, 0x23, 0x01, 0x00, 0x00, 0x11, 0x22};
+    static const uint8_t remote[] = {0x01, CANOPY_CAN_REMOTE, 0x08, 0x00, 0x23, 0x01, 0x00, 0x00};
+    canopy_can_frame_t frame; /* as the runtime makes one: no more than that is written */
+    uint8_t bytes[100];
+
+    frame.id = 0x123;
+    frame.flags = 0;
+    frame.length = 2;
+    frame.data[0] = 0x11;
+    frame.data[1] = 0x22;
+    open_bus(&a, NULL);
+    const int peer = bare_socket("1-00c0ffee.sock");
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(sizeof data, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(data, bytes, sizeof data);
+    frame.flags = CANOPY_CAN_REMOTE;
+    frame.length = 8;
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(sizeof remote, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(remote, bytes, sizeof remote);
+    (void)close(peer);
+}
+
 static void test_malformed_datagrams_are_counted_and_change_nothing(void)
 {
     static const uint8_t good[] = {1, 0, 2, 0, 0x23, 1, 0, 0, 0x11, 0x22};
@@ -424,6 +450,7 @@ int main(void)
     RUN_TEST(test_frames_go_both_ways_and_not_to_the_sender);
     RUN_TEST(test_every_kind_of_frame_arrives_as_it_was_sent);
     RUN_TEST(test_datagram_is_the_one_of_the_documentation);
+    RUN_TEST(test_nothing_but_the_data_reaches_the_bus);
     RUN_TEST(test_malformed_datagrams_are_counted_and_change_nothing);
     RUN_TEST(test_filter_and_error_frames);
     RUN_TEST(test_frame_that_no_bus_can_carry_is_refused);

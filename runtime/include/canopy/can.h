@@ -25,7 +25,10 @@ enum {
     CANOPY_CAN_ERROR_STATE = 1u << 5
 };
 
-/** One frame. Bytes of data past length are not defined. */
+/**
+ * One frame. Bytes of data past length are not defined, nor is any of a remote frame: a driver neither reads them nor
+ * lets them out, to the bus or into a log.
+ */
 typedef struct {
     uint32_t id;    /**< Arbitration id without flags: 0..0x7FF, extended 0..0x1FFFFFFF. */
     uint8_t flags;  /**< CANOPY_CAN_... */

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -102,6 +103,19 @@ def test_every_kind_of_frame_both_ways(program: Path, frame: str) -> None:
         run("cansend", "vcan0", frame)
         assert probe.receive() == frame
         assert probe.stats()["sent"] == probe.stats()["received"] == 1
+
+
+@pytest.mark.parametrize("frame", ["123#1122", "7FF#", "321#R5"])
+def test_the_rest_of_a_frame_is_zero(probe: CanProbe, frame: str) -> None:
+    """The kernel's frame always has 8 bytes. Those that are not data carry nothing of the program's memory."""
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
+        raw.bind(("vcan0",))
+        raw.settimeout(10)
+        assert probe.send(frame) == 1
+        seen = raw.recv(16)
+    data = b"" if "R" in frame else bytes.fromhex(frame.partition("#")[2])
+    assert seen[5:8] == bytes(3)
+    assert seen[8:] == data.ljust(8, b"\0")
 
 
 def test_filter_by_ids(program: Path) -> None:

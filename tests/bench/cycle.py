@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""Counts the instructions of whole cycles of the examples, on this machine and on Cortex-M4."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cantools
+
+from . import build, cortex_m, image, instructions
+
+EXAMPLES = build.REPOSITORY / "examples"
+CYCLES = 100
+WHOLE = "canopy_loop_step"
+# What of a cycle is counted by itself: the functions' instructions, with all that they call.
+PARTS = {
+    "receive": ("canopy_bus_receive",),
+    "begin": ("canopy_bus_begin_tick",),
+    "tick": ("canopy_tree_tick",),
+    "commit": ("canopy_bus_commit",),
+    "trace": ("canopy_trace_send",),
+    # In receive and commit, and there a second time.
+    "e2e": ("canopy_e2e_check", "canopy_e2e_protect"),
+}
+
+
+@dataclass(frozen=True)
+class Application:
+    """An example, and what its bus carries before each cycle: message -> its signals' values."""
+
+    name: str
+    folder: Path
+    tree: str
+    dbc: str
+    leaves: tuple[str, ...]
+    frames: dict[str, dict[str, Any]]
+    options: tuple[str, ...] = ()
+
+
+_E2E = {"E2E_CRC": 0, "E2E_Counter": 0}
+_NAO = {
+    "Battery": {**_E2E, "Charging": 0, "Level": 50.0, "ChargerDistance": 5.0},
+    "Posture": {**_E2E, "HeadX": 0.5, "HeadHeight": 0.0},
+}
+_COURIER = {
+    "Pose": {"X": 0, "Y": 0},
+    "Order": {"Number": 1, "X": 3000, "Y": 2000},
+    "PlanReply": {"Number": 1, "Result": 1, "ViaX": 1500, "ViaY": 1400},
+    "MapStatus": {"ClearNumber": 1},
+}
+_COURIER_TYPES = {
+    "geometry_msgs::msg::PoseStamped_<std::allocator<void>>": "pose_t",
+    "nav_msgs::msg::Path_<std::allocator<void>>": "path_t",
+}
+APPLICATIONS = (
+    Application("nao_power", EXAMPLES / "nao", "power_supply.xml", "nao.dbc", ("power_leaves.c",), _NAO),
+    Application("nao_home", EXAMPLES / "nao", "get_home.xml", "nao.dbc", ("home_leaves.c",), _NAO),
+    Application(
+        "courier",
+        EXAMPLES / "courier",
+        "courier.xml",
+        "courier.dbc",
+        ("navigation_nodes.c", "courier_leaves.c"),
+        _COURIER,
+        (
+            *("--include", "courier_types.h"),
+            *(word for cpp, c in _COURIER_TYPES.items() for word in ("--type-map", f"{cpp}={c}")),
+        ),
+    ),
+)
+
+
+def _frames(application: Application) -> str:
+    """The frames that arrive as C: bench_frames."""
+    database = cantools.database.load_file(application.folder / application.dbc)
+    rows = []
+    for name, values in application.frames.items():
+        message = database.get_message_by_name(name)  # type: ignore[union-attr]
+        data = message.encode(values)
+        rows.append(f"{{.id = {message.frame_id}u, .length = {len(data)}, .data = {{{', '.join(map(str, data))}}}}}")
+    lines = ",\n    ".join(rows)
+    return (
+        f'#include "cycle.h"\n\nconst canopy_can_frame_t bench_frames[] = {{\n    {lines}}};\n'
+        f"const uint32_t bench_frame_count = {len(rows)};\n"
+    )
+
+
+def generate(application: Application, folder: Path) -> Path:
+    """The application in C, and frames.c; returns the folder with all that."""
+    out = folder / application.name
+    tree, dbc = application.folder / "trees" / application.tree, application.folder / application.dbc
+    options = ("--node", "Controller", "--period-ms", "50", "--name", application.name, *application.options)
+    build.run(*image.CANOPY, "compile", tree, "--dbc", dbc, *options, "-o", out)
+    (out / "frames.c").write_text(_frames(application), encoding="utf-8")
+    return out
+
+
+def _sources(application: Application, generated: Path) -> tuple[str | Path, ...]:
+    return (
+        *(f"-DBENCH_APP={application.name}_app", f"-I{generated}", f"-I{application.folder}"),
+        *sorted(generated.glob("*.c")),
+        *(application.folder / leaves for leaves in application.leaves),
+        *sorted((build.REPOSITORY / "runtime/src").glob("*.c")),
+        build.HERE / "cycle.c",
+    )
+
+
+def host_program(target: build.Target, application: Application, generated: Path, folder: Path) -> Path:
+    """The application and its bus for this machine: bench_cycle CYCLES."""
+    path = folder / f"cycle_{application.name}_{target.name}"
+    sources = _sources(application, generated)
+    build.run(*target.command, *build.COMMON, *sources, build.HERE / "cycle_main.c", "-o", path)
+    return path
+
+
+def measure_host(program: Path) -> dict[str, float]:
+    """Part -> its instructions per cycle, and "whole". Raises RuntimeError when a frame was lost or rejected."""
+    parts = {"whole": (WHOLE,), **PARTS}
+    return {
+        part: round(instructions.collected((program, str(CYCLES)), within=functions)[0] / CYCLES, 1)
+        for part, functions in parts.items()
+    }
+
+
+def bare_program(target: build.Target, application: Application, generated: Path, folder: Path) -> Path:
+    """The same for a Cortex-M core, as build.link_bare()."""
+    path = folder / f"cycle_{application.name}_{target.name.replace(' ', '_')}.elf"
+    return build.link_bare(target, path, *_sources(application, generated))
+
+
+def measure_cortex(program: Path) -> dict[str, float]:
+    """As measure_host(), and "worst": the most that a single cycle took."""
+    core = cortex_m.Core(program)
+    if core.call("bench_cycle_start") != 0:
+        raise RuntimeError(f"{program.name}: canopy_loop_init() rejects the application")
+    parts = {function: part for part, functions in PARTS.items() for function in functions}
+    totals = dict.fromkeys(("whole", *PARTS), 0)
+    worst = 0
+    for _ in range(CYCLES):
+        core.call("bench_cycle_prepare")
+        counts = core.count_parts(WHOLE, parts, core.address("bench_loop"))
+        worst = max(worst, counts["whole"])
+        for part, count in counts.items():
+            totals[part] += count
+    failures = core.call("bench_cycle_failures")
+    if failures != 0:
+        raise RuntimeError(f"{program.name}: {failures} frames were lost or rejected, or faults counted")
+    return {**{part: round(total / CYCLES, 1) for part, total in totals.items()}, "worst": worst}
