@@ -21,6 +21,7 @@ from canopy.convert.read_back import read_result, runnable, signal_inputs
 from canopy.convert.result import NotEqualError, write_checked
 from canopy.convert.scxml import read_scxml
 from canopy.convert.writer import merge_leaves, tree_file
+from canopy.escape.terminal import echo, echo_lines
 
 NOT_EQUAL = 1
 INPUT_ERROR = 2
@@ -48,7 +49,7 @@ def _tree_id(command: _Command) -> _Command:
 
 def _finish(text: str, output: str, check: Callable[[Path], Verdict] | None) -> None:
     verdict = write_checked(text, output, check)
-    click.echo("not checked" if verdict is None else f"equal to the source: {verdict}", err=True)
+    echo("not checked" if verdict is None else f"equal to the source: {verdict}", err=True)
 
 
 def _guarded(work: Callable[[], None]) -> None:
@@ -56,10 +57,10 @@ def _guarded(work: Callable[[], None]) -> None:
     try:
         work()
     except CompileError as error:
-        click.echo(str(error), err=True)
+        echo_lines(str(error), err=True)
         sys.exit(INPUT_ERROR)
     except NotEqualError as error:
-        click.echo(f"error: the result is not equal to the source, and was not written:\n{error}", err=True)
+        echo_lines(f"error: the result is not equal to the source, and was not written:\n{error}", err=True)
         sys.exit(NOT_EQUAL)
 
 
@@ -114,7 +115,7 @@ def decision_tree_command(
             return compare(one, TreeMachine(read, show_acting), limit=affordable(limit, read), seed=seed)
 
         for note in made.notes:
-            click.echo(f"note: {note}", err=True)
+            echo(f"note: {note}", err=True)
         leaves = merge_leaves(made.leaves, Place(str(file)))
         comment = f"The decision tree {file.name}."
         _finish(tree_file(_checked_id(tree_id, "DecisionTree"), made.root, leaves, comment), output, check)
@@ -145,9 +146,9 @@ def subsumption_command(
         leaves = merge_leaves(models, place)
         rows = subsumption.table(layers, otherwise) if table else []
         for statuses, who in rows:
-            click.echo(" | ".join((*statuses, who)), err=True)
+            echo(" | ".join((*statuses, who)), err=True)
         if otherwise is None:
-            click.echo(
+            echo(
                 "note: when no layer wants control the tree FAILS, and every output takes its safe value; "
                 "--otherwise ACTION gives control to an action instead",
                 err=True,
@@ -176,7 +177,7 @@ def funnels_command(file: Path, tree_id: str | None, output: str, limit: int, se
         order = funnels.order(family)
         for one in order.unplaced:
             point = ", ".join(f"{name} = {value}" for name, value in one.stuck.items())
-            click.echo(
+            echo(
                 f"warning: {one.controller.id} cannot be placed: its goal contains {point}, where none of "
                 f"{', '.join(c.id for c in order.placed)} takes over",
                 err=True,

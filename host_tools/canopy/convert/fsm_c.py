@@ -15,6 +15,8 @@ from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.names import snake
 from canopy.convert.equivalence import Answers, Shown, State
 from canopy.convert.to_fsm import Jump, Machine, Vertex
+from canopy.escape.c import in_code, in_comment
+from canopy.files import read_bytes
 from canopy.semantics.spec import CONTINUE, FAILURE, HALTED, RUNNING, START, SUCCESS
 
 _HEADER = """\
@@ -141,9 +143,9 @@ def write_c(machine: Machine) -> str:
     rows = []
     for vertex in machine.vertices:
         cells = ", ".join(_jump(vertex.jumps.get(status), count) for status in (RUNNING, SUCCESS, FAILURE))
-        rows.append(f"        {{{cells}}}, /* {vertex.name.replace('*/', '* /')} */")
+        rows.append(f"        {{{cells}}}, /* {in_comment(vertex.name)} */")
     return _HEADER.format(
-        tree=machine.name.replace("*/", "* /"), name=name, upper=upper, count=count, leaves="\n".join(leaves),
+        tree=in_comment(machine.name), name=in_code(name), upper=in_code(upper), count=count, leaves="\n".join(leaves),
         jumps="\n".join(rows), begin=_jump(machine.begin, count),
     )  # fmt: skip
 
@@ -165,9 +167,9 @@ class CompiledMachine:
         # Not kept open: a loaded library stays mapped when its file is gone.
         with tempfile.TemporaryDirectory(prefix="canopy-") as folder:
             copy = Path(folder) / f"{snake(name)}_fsm.h"
-            copy.write_bytes(path.read_bytes())
+            copy.write_bytes(read_bytes(path))
             source, library = Path(folder) / "check.c", Path(folder) / "check.so"
-            source.write_text(_HARNESS.format(name=snake(name)), encoding="utf-8")
+            source.write_bytes(_HARNESS.format(name=in_code(snake(name))).encode())
             options = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC"]
             built = subprocess.run(
                 [*compiler, *options, str(source), "-o", str(library)], capture_output=True, text=True, timeout=300

@@ -12,6 +12,8 @@ from canopy.compiler.xml_reader import Element as XmlElement
 from canopy.compiler.xml_reader import read_xml
 from canopy.convert.scxml import NAMESPACE
 from canopy.convert.to_fsm import Group, Jump, Machine, Vertex
+from canopy.escape.dot import quoted
+from canopy.files import read_text
 from canopy.fmt.document import Document, Element
 from canopy.fmt.writer import write_document
 from canopy.semantics.spec import FAILURE, RUNNING, STATUS_NAMES, SUCCESS
@@ -67,15 +69,10 @@ def write_scxml(machine: Machine) -> str:
     return write_document(Document('<?xml version="1.0" encoding="UTF-8"?>', [root]))
 
 
-def _quoted(text: str) -> str:
-    """The inside of a text in DOT."""
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
-
-
 def write_dot(machine: Machine) -> str:
     """DOT: leaves are boxes, edges S, R and F; clusters are the boxes of Fig. 11."""
     lines = [
-        f'digraph "{_quoted(machine.name)}" {{',
+        f"digraph {quoted(machine.name)} {{",
         "  rankdir=LR;",
         f'  "{SOURCE}" [label="Tick\\nSource", shape=circle];',
     ]
@@ -84,14 +81,12 @@ def write_dot(machine: Machine) -> str:
     def box(group: Group, indent: str) -> None:
         nonlocal count
         count += 1
-        label = _quoted(group.name)
         lines.append(f"{indent}subgraph cluster_{count} {{")
-        lines.append(f'{indent}  label="{label}";')
+        lines.append(f"{indent}  label={quoted(group.name)};")
         for part in group.parts:
             if isinstance(part, int):
                 vertex = machine.vertices[part]
-                name = _quoted(vertex.name)
-                lines.append(f'{indent}  "{vertex.id}" [label="{name}", shape=box];')
+                lines.append(f'{indent}  "{vertex.id}" [label={quoted(vertex.name)}, shape=box];')
             else:
                 box(part, f"{indent}  ")
         lines.append(f"{indent}}}")
@@ -173,6 +168,6 @@ def read_dot_back(path: Path, vertices: Sequence[Vertex]) -> tuple[list[Vertex],
     """
     table = _Table(vertices, Place(str(path)))
     status_of = {letter: status for status, letter in LETTERS.items()}
-    for source, target, letter, halts, returns in _EDGE.findall(path.read_text(encoding="utf-8")):
+    for source, target, letter, halts, returns in _EDGE.findall(read_text(path)):
         table.add(source, status_of.get(letter), target, halts, returns)
     return table.done()

@@ -10,6 +10,7 @@ from typing import Any
 
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.numbers import exact
+from canopy.files import FileError, read_text
 
 MAX_BYTES = 16 * 1024 * 1024
 
@@ -39,18 +40,15 @@ def read_json(path: Path) -> Any:
     """
     place = Place(str(path))
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise CompileError(place, f"the file has {size} bytes; at most {MAX_BYTES} are read")
         return json.loads(
-            path.read_bytes().decode("utf-8"),
+            read_text(path, MAX_BYTES),
             parse_float=Written,
             parse_int=Written,
             parse_constant=_refuse_constant,
             object_pairs_hook=_no_duplicates,
         )
-    except OSError as error:
-        raise CompileError(place, f"cannot be read: {error.strerror}") from error
+    except FileError as error:
+        raise CompileError(place, error.problem) from error
     except json.JSONDecodeError as error:
         raise CompileError(Place(str(path), error.lineno, error.colno), f"not valid JSON: {error.msg}") from error
     except (ValueError, RecursionError) as error:

@@ -8,10 +8,9 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-import click
-
 from canopy.compiler.errors import CompileError, Place
 from canopy.convert.equivalence import Difference, Key, Shown, Verdict
+from canopy.escape.terminal import echo_lines
 from canopy.semantics.spec import CALL_NAMES, STATUS_NAMES
 
 
@@ -81,7 +80,7 @@ def write_checked(text: str, output: str, check: Callable[[Path], Verdict] | Non
     except OSError as error:
         raise CompileError(Place(output), f"cannot be written: {error.strerror}") from error
     if target is None:
-        click.echo(text, nl=False)
+        echo_lines(text)
     return verdict
 
 

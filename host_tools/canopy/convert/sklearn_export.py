@@ -11,10 +11,12 @@ Runs in your Python, where the estimator is: a pickle or joblib file runs whatev
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from canopy.escape.json_text import dumps
+from canopy.files import write_files
 
 
 def export(estimator: Any, path: str | Path, signals: Sequence[str], actions: Mapping[Any, str] | None = None) -> None:
@@ -49,4 +51,4 @@ def export(estimator: Any, path: str | Path, signals: Sequence[str], actions: Ma
         return {"if": predicate, "then": branch(left), "else": branch(right)}
 
     content = {"comparison": "float32", "tree": branch(0)}
-    Path(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_files({Path(path): f"{dumps(content, indent=1)}\n".encode()})

@@ -23,6 +23,7 @@ from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.script.syntax import Comparison, Name, Number, ScriptError, Unary, parse
 from canopy.convert.read_back import STATUS_OF
+from canopy.files import FileError, read_text
 from canopy.semantics.spec import SUCCESS
 
 MAX_BYTES = 1024 * 1024
@@ -151,13 +152,9 @@ def read_facts(path: Path, leaves: Mapping[str, Leaf]) -> Facts:
     """
     place = Place(str(path))
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise CompileError(place, f"the file has more than {MAX_BYTES} bytes")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise CompileError(place, f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise CompileError(place, "is not UTF-8") from error
+        text = read_text(path, MAX_BYTES)
+    except FileError as error:
+        raise CompileError(place, error.problem) from error
     reader = _Reader(path, leaves)
     for number, line in enumerate(text.splitlines(), 1):
         content = line.partition("#")[0].strip()

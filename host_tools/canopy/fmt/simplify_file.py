@@ -11,6 +11,7 @@ from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
 from canopy.convert.equivalence import Rules, Verdict
+from canopy.files import read_bytes
 from canopy.fmt.application_facts import (
     ClauseRules,
     Facts,
@@ -117,7 +118,7 @@ def simplify_bytes(path: Path, facts_file: Path | None) -> tuple[bytes, list[Rep
     """
     leaves = read_tree(path, ANY_TYPE).leaves
     facts = read_facts(facts_file, leaves) if facts_file is not None else Facts()
-    document = read_document(path.read_bytes(), str(path))
+    document = read_document(read_bytes(path), str(path))
     work = Work(path, Knowledge(leaves, facts.returns, frozenset(facts.memoryless)), facts)
     for root in document.content:
         for tree in child_elements(root) if isinstance(root, Element) else ():
