@@ -16,6 +16,7 @@ SUBCOMMANDS = {
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
+    "verify": ("canopy.verify.cli", "Prove what a tree guarantees, given a model of its leaves."),
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
@@ -41,7 +42,7 @@ class _LazyGroup(click.Group):
         except ModuleNotFoundError as error:
             if error.name is None or error.name.startswith("canopy"):
                 raise
-            extra = "can" if error.name == "can" else error.name
+            extra = {"z3": "verify", "cvc5": "verify"}.get(error.name, error.name)
             click.echo(
                 f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
             )
