@@ -10,8 +10,11 @@ from typing import Any
 
 import click
 
+from canopy.certificate.check import check, decoded
+from canopy.certificate.formula import RejectedError
 from canopy.compiler.cli import read_type_options, type_options
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
+from canopy.verify.certify import certificate
 from canopy.verify.claims import Result
 from canopy.verify.model import Plant, number
 from canopy.verify.run import Subject, chosen, hand_over, load, model_path, recheck, verify
@@ -72,6 +75,42 @@ def _print_handover(subject: Subject) -> None:
         click.echo("hand-over: no step leads to where the tree fails")
 
 
+def _certify(folder: Path, subject: Subject, result: Result, tree: Path, timeout: float, *, quiet: bool) -> None:
+    """Writes the certificate of a claim, or says why there is none."""
+    try:
+        text = certificate(result.claim, tree, subject.plant.path, timeout)
+    except RejectedError as error:
+        line = f"no certificate: {error}"
+    else:
+        file = folder / f"claim-{result.claim.index + 1:02d}.certificate"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(text)
+        except OSError as error:
+            raise CompileError(Place(str(file)), f"cannot be written: {error.strerror}") from error
+        line = f"certificate {file}, {len(text)} bytes"
+    if not quiet:
+        click.echo(f"         {line}")
+
+
+def _check(folder: Path, tree: Path, model: Path) -> int:
+    """Checks every certificate of a folder. Returns the exit status."""
+    files = sorted(folder.glob("*.certificate"))
+    if not files:
+        click.echo(f"{folder}: error: no certificates\n  help: write them with --certificate {folder}", err=True)
+        return INPUT_ERROR
+    rejected = 0
+    for file in files:
+        try:
+            text = file.read_bytes()
+            shown = check(text, tree, model)
+            click.echo(f"accepted {file.name}: {decoded(text)['name']}: {shown}")
+        except (RejectedError, OSError) as error:
+            rejected += 1
+            click.echo(f"rejected {file.name}: {error}")
+    return UNEXPECTED if rejected else 0
+
+
 @click.command()
 @click.argument("tree", metavar="TREE", type=click.Path(path_type=Path))
 @click.option("--model", type=click.Path(path_type=Path), help="The model. [default: NAME.plant.toml beside the tree]")
@@ -83,6 +122,8 @@ def _print_handover(subject: Subject) -> None:
 @click.option(
     "--timeout", default=60.0, show_default=True, type=click.FloatRange(0.1, 86_400), help="Seconds per claim."
 )
+@click.option("--certificate", "folder", type=click.Path(path_type=Path), help="Write certificates to this folder.")
+@click.option("--check", "checked_folder", type=click.Path(path_type=Path), help="Only check a folder's certificates.")
 @click.option("--handover", is_flag=True, help="Also print which leaf hands over to which.")
 @click.option("--trace", "whole", is_flag=True, help="Print every trace, and all of it.")
 @click.option("--json", "json_", is_flag=True, help="Print JSON.")
@@ -100,6 +141,8 @@ def command(
     names: tuple[str, ...],
     solver: tuple[str, ...],
     timeout: float,
+    folder: Path | None,
+    checked_folder: Path | None,
     handover: bool,
     whole: bool,
     json_: bool,
@@ -109,17 +152,25 @@ def command(
     The model says for each leaf where it returns what, and what it does to the plant's state. Each claim in it is
     proven, refuted with a state and the steps from there, or unknown. All arithmetic is exact.
 
-    Exit status: 0 all came out as the model file expects, 1 one did not, or a solver disagrees, 2 wrong input.
+    A certificate has the numbers that show a claim of the kinds reaches and avoids. --check judges them again with a
+    small program that has no solver, and that reads tree and model by itself.
+
+    Exit status: 0 all came out as the model file expects, 1 one did not, a solver disagrees, or a certificate is
+    rejected, 2 wrong input.
 
     \b
     Examples:
       canopy verify examples/nao/trees/get_home.xml
       canopy verify examples/nao/trees/power_supply.xml --dbc examples/nao/nao.dbc --node Controller
       canopy verify examples/nao/trees/get_home.xml --solver z3 --solver cvc5 --json
+      canopy verify examples/nao/trees/get_home.xml --certificate proofs
+      canopy verify examples/nao/trees/get_home.xml --check proofs
     """
     if (dbc is None) != (node is None):
         raise click.UsageError("--dbc and --node go together")
     results = []
+    if checked_folder is not None:
+        sys.exit(_check(checked_folder, tree, model or model_path(tree)))
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         subject = load(tree, model or model_path(tree), dbc, node or "", options)
@@ -129,6 +180,8 @@ def command(
             results.append((result, checked))
             if not json_:
                 _print(subject.plant, result, checked, whole)
+            if folder is not None and result.verdict == "proven":
+                _certify(folder, subject, result, tree, timeout, quiet=json_)
         if handover and not json_:
             _print_handover(subject)
     except CompileError as error:

@@ -64,7 +64,10 @@ class TomlFile:
         self._lines = _lines(text)
 
     def place(self, *path: str) -> Place:
-        """The line of a key, or of the nearest table around it that has one."""
+        """The line of a key, of the first one below it, or of the nearest table around it that has one."""
+        below = [line for key, line in self._lines.items() if path and key[: len(path)] == path]
+        if below:
+            return Place(str(self.path), min(below))
         while path and path not in self._lines:
             path = path[:-1]
         return Place(str(self.path), self._lines.get(path, 0))
