@@ -42,7 +42,7 @@ class _LazyGroup(click.Group):
         except ModuleNotFoundError as error:
             if error.name is None or error.name.startswith("canopy"):
                 raise
-            extra = {"z3": "verify", "cvc5": "verify"}.get(error.name, error.name)
+            extra = "can" if error.name == "can" else error.name
             click.echo(
                 f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
             )

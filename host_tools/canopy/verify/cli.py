@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -168,6 +169,9 @@ def command(
     """
     if (dbc is None) != (node is None):
         raise click.UsageError("--dbc and --node go together")
+    for one in solver:
+        if importlib.util.find_spec(one) is None:
+            raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
     results = []
     if checked_folder is not None:
         sys.exit(_check(checked_folder, tree, model or model_path(tree)))
