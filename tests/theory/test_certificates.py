@@ -171,6 +171,32 @@ def test_what_is_false_gets_no_certificate() -> None:
             made(tree, name)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('<BehaviorTree ID="GetHome">', '<include path="other.xml"/><BehaviorTree ID="GetHome">'),
+        (' main_tree_to_execute="GetHome"', ""),
+        ("<WalkHome name", '<WalkHome _skipIf="true" name'),
+        ("ReactiveFallback", "Fallback"),
+        ("<LieDownToSitUp name", "<SubTree ID"),
+    ],
+)
+def test_a_tree_that_the_checker_does_not_know_is_rejected(tmp_path: Path, old: str, new: str) -> None:
+    tree = tmp_path / "tree.xml"
+    text = HOME.read_text().replace(old, new)
+    other = '<BehaviorTree ID="Other"><WalkHome/></BehaviorTree><TreeNodesModel>'
+    tree.write_text(text.replace("<TreeNodesModel>", other) if "main" in old else text)
+    with pytest.raises(RejectedError):
+        Asked(Files(tree, model_path(HOME)), 1)
+
+
+def test_certificates_are_about_the_main_tree(tmp_path: Path) -> None:
+    arguments = ["verify", str(HOME), "--main-tree", "GetHome", "--certificate", str(tmp_path)]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2
+    assert "leave --main-tree out" in result.output
+
+
 def test_the_checker_is_small_and_apart() -> None:
     lines = 0
     for file in CHECKER.glob("*.py"):

@@ -201,6 +201,19 @@ def test_a_node_with_a_memory_is_not_a_function_of_the_state(tmp_path: Path) -> 
     assert "help: use <ReactiveFallback>" in result.output
 
 
+def test_a_free_leaf_that_may_be_skipped_has_no_model(tmp_path: Path) -> None:
+    tree, model = tmp_path / "fig16.xml", tmp_path / "fig16.plant.toml"
+    source = ROOT / "examples/papers/trees/fig16.xml"
+    declared = "<MetadataFields><Metadata returns='RUNNING SKIPPED'/></MetadataFields></Action>"
+    tree.write_text(
+        source.read_text().replace('<Action ID="PerformMission"/>', f'<Action ID="PerformMission">{declared}')
+    )
+    model.write_text(source.with_suffix(".plant.toml").read_text())
+    result = CliRunner().invoke(main, ["verify", str(tree), "--claim", "It can chatter, as at the right of Fig. 18"])
+    assert result.exit_code == 2
+    assert "leaf 'PerformMission' may return SKIPPED" in result.output
+
+
 def test_rude_files_end_with_an_error(tmp_path: Path) -> None:
     for number, text in enumerate(
         (

@@ -114,6 +114,8 @@ def _tree(text: bytes) -> tuple[Node, dict[str, tuple[str, tuple[str, ...]]]]:
     root = ElementTree.fromstring(text)
     trees = {one.get("ID", ""): one for one in root.findall("BehaviorTree")}
     main = root.get("main_tree_to_execute", next(iter(trees)))
+    if root.find("include") is not None or (len(trees) > 1 and "main_tree_to_execute" not in root.attrib):
+        raise RejectedError("the tree includes files, or does not say which of its trees is the main one")
     kinds = {}
     for model in root.findall("TreeNodesModel/*"):
         metadata = {key: value for one in model.findall("MetadataFields/Metadata") for key, value in one.items()}
@@ -219,6 +221,8 @@ class Builder:
         if table.get("free", False):
             kind = (S, R, F) if node.kind == "StatefulAction" else (S, F)
             declared = self.files.kinds[node.id][1] or kind
+            if "SKIPPED" in declared:
+                raise RejectedError(f"leaf '{node.id}' may return SKIPPED")
             acts = (node.path,) if table.get("modes") else ()
             return [(one, acts if one == R else (), self.files.domain) for one in kind if one in declared]
         regions = self._regions(table)

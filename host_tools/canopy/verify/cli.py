@@ -112,6 +112,27 @@ def _check(folder: Path, tree: Path, model: Path) -> int:
     return UNEXPECTED if rejected else 0
 
 
+def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tuple[str, ...], stored: bool) -> None:
+    """Rejects options that do not go together."""
+    if (dbc is None) != (node is None):
+        raise click.UsageError("--dbc and --node go together")
+    if main_tree is not None and stored:
+        raise click.UsageError("certificates are about the file's main tree: leave --main-tree out")
+    for one in solver:
+        if importlib.util.find_spec(one) is None:
+            raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
+
+
+def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json_: bool) -> None:
+    """Ends with what the results say."""
+    if json_:
+        click.echo(json.dumps([_as_json(subject, *one) for one in results], indent=1, ensure_ascii=False))
+    elif not results:
+        click.echo("the model is one of this tree; it claims nothing")
+    good = all(one.expected and "disagrees" not in checked.values() for one, checked in results)
+    sys.exit(0 if good else UNEXPECTED)
+
+
 @click.command()
 @click.argument("tree", metavar="TREE", type=click.Path(path_type=Path))
 @click.option("--model", type=click.Path(path_type=Path), help="The model. [default: NAME.plant.toml beside the tree]")
@@ -167,11 +188,7 @@ def command(
       canopy verify examples/nao/trees/get_home.xml --certificate proofs
       canopy verify examples/nao/trees/get_home.xml --check proofs
     """
-    if (dbc is None) != (node is None):
-        raise click.UsageError("--dbc and --node go together")
-    for one in solver:
-        if importlib.util.find_spec(one) is None:
-            raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
+    _usage(dbc, node, main_tree, solver, folder is not None or checked_folder is not None)
     results = []
     if checked_folder is not None:
         sys.exit(_check(checked_folder, tree, model or model_path(tree)))
@@ -191,9 +208,4 @@ def command(
     except CompileError as error:
         click.echo(str(error), err=True)
         sys.exit(INPUT_ERROR)
-    if json_:
-        click.echo(json.dumps([_as_json(subject, *one) for one in results], indent=1, ensure_ascii=False))
-    elif not results:
-        click.echo("the model is one of this tree; it claims nothing")
-    good = all(one.expected and "disagrees" not in checked.values() for one, checked in results)
-    sys.exit(0 if good else UNEXPECTED)
+    _finish(subject, results, json_)

@@ -96,6 +96,12 @@ class Regions:
             }
             return {key: formula for key, formula in cases.items() if not formula.is_empty}
         assert node.leaf is not None
+        if "SKIPPED" in node.leaf.returns:
+            raise CompileError(
+                node.place,
+                f"leaf '{node.leaf.id}' may return SKIPPED, for which the model has no region",
+                "take its subtree as arbitrary in the claim",
+            )
         kind = (SUCCESS, FAILURE) if node.type.name != "StatefulAction" else STATUSES
         returns = tuple(status for status in kind if status in (node.leaf.returns or kind))
         acts = (node.path,) if model.modes else ()
