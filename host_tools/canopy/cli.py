@@ -17,6 +17,7 @@ SUBCOMMANDS = {
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
+    "verify": ("canopy.verify.cli", "Prove what a tree guarantees, given a model of its leaves."),
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
