@@ -100,7 +100,9 @@ def all_runs(every_inner: bool) -> list[Run]:
         )
         for name in sorted(types, key=lambda name: name not in heavy)
     ]
-    loop = [f"runtime/src/{part}.c" for part in ("tree", "bus", "can_state", "loop", "trace", "tx", "tx_service", "e2e")]
+    loop = [
+        f"runtime/src/{part}.c" for part in ("tree", "bus", "can_state", "loop", "trace", "tx", "tx_service", "e2e")
+    ]
     generated = [str(path) for path in sorted(application.glob("*.c"))]
     runs += [
         Run("wp ring, time", [f"{HERE}/wp_arithmetic.c", "runtime/src/ring.c"], ["-wp-model", "Typed+Cast"], wp=True),
