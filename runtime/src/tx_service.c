@@ -97,11 +97,10 @@ static void set_flying(canopy_tx_t *self, const canopy_tx_mailbox_t *box, bool f
     }
 }
 
-/** Takes note of what has become of the frame in a mailbox. */
-static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
+/** Takes note of what has become of the frame in a mailbox, which `box` describes. */
+static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_mailbox_t *box, canopy_time_t now)
 {
     const canopy_can_t *can = self->can;
-    canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
     canopy_can_outcome_t outcome = can->outcome(can->context, mailbox);
 
     if (outcome == CANOPY_CAN_PENDING) {
@@ -113,19 +112,21 @@ static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, canopy_ti
     } else if (box->what != CANOPY_TX_TRACE) {
         note_aborted(self, box, now);
     }
-    box->what = 0;
+    self->mailboxes[mailbox].what = 0;
     return outcome;
 }
 
 /** Asks for a frame back. @return true: the mailbox is free already. */
 static bool take_back(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
 {
-    if (self->can->abort == NULL || self->mailboxes[mailbox].aborting) {
+    canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
+
+    if (self->can->abort == NULL || box->aborting) {
         return false;
     }
-    self->mailboxes[mailbox].aborting = true;
+    box->aborting = true;
     self->can->abort(self->can->context, mailbox);
-    return settle(self, mailbox, now) != CANOPY_CAN_PENDING;
+    return settle(self, mailbox, box, now) != CANOPY_CAN_PENDING;
 }
 
 /** Empties mailboxes: what is out, and what must not get out any more. */
@@ -134,7 +135,7 @@ static void collect(canopy_tx_t *self, canopy_time_t now)
     for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
         const canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
 
-        if (box->what == 0u || settle(self, mailbox, now) != CANOPY_CAN_PENDING) {
+        if (box->what == 0u || settle(self, mailbox, box, now) != CANOPY_CAN_PENDING) {
             continue;
         }
         if (canopy_time_reached(now, box->until) ||
@@ -154,14 +155,14 @@ static uint8_t find_mailbox(canopy_tx_t *self, uint32_t what, canopy_time_t now)
     uint32_t least_what = what;
 
     for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
-        uint32_t other = self->mailboxes[mailbox].what;
+        const canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
 
-        if (other == 0u) {
+        if (box->what == 0u) {
             return mailbox;
         }
-        if (other > least_what) {
+        if (box->what > least_what) {
             least = mailbox;
-            least_what = other;
+            least_what = box->what;
         }
     }
     return least != (uint8_t)NO_MAILBOX && take_back(self, least, now) ? least : (uint8_t)NO_MAILBOX;
@@ -199,7 +200,7 @@ static int load(canopy_tx_t *self, uint8_t mailbox, const canopy_can_frame_t *fr
     watch(self, box->until);
     self->mailboxes[mailbox] = *box;
     set_flying(self, box, true);
-    return settle(self, mailbox, frame->time) != CANOPY_CAN_ABORTED ? 1 : 0;
+    return settle(self, mailbox, box, frame->time) != CANOPY_CAN_ABORTED ? 1 : 0;
 }
 
 /**

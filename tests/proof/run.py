@@ -31,9 +31,9 @@ EXACT = ["-eva-slevel", "10000000", "-eva-split-return", "full"]
 # States are mixed at once: only so can tables of every size be looked at.
 ANY_TABLE = ["-eva-slevel", "2", "-eva-domains", "cvalue,equality,symbolic-locations"]
 ANY_TABLE += ["-eva-split-return-function", "canopy_tree_init:0,canopy_tree_validate:0"]
-# main() may mix its states: which hooks there are is one state.
-LOOP = ["-eva-slevel", "60", "-eva-split-return-function", "receive:full"]
-LOOP += ["-eva-slevel-function", "send_changes:2000,main:0,canopy_tx_init:200"]
+# main() may mix its states: which hooks there are is one state. A mailbox is looked at by itself.
+LOOP = ["-eva-slevel", "20", "-eva-split-return-function", "receive:full,copy:0,find_mailbox:full,settle:full"]
+LOOP += ["-eva-slevel-function", "send_changes:2000,main:0,find_mailbox:500,collect:500", "-eva-min-loop-unroll", "4"]
 
 
 @dataclass
@@ -54,9 +54,11 @@ class Run:
         include = [*self.include, "runtime/include", "runtime/src"]
         cpp = [f"-I{folder}" for folder in include] + [f"-D{define}" for define in self.defines]
         if self.wp:
-            cpp = ["-nostdinc", f"-I{HERE}/include", *cpp, f"-I{share.strip()}/libc"]
+            cpp = ["-nostdinc", f"-I{HERE}/include", f"-I{HERE}/include/atomics", *cpp, f"-I{share.strip()}/libc"]
             prove = ["-wp", "-wp-rte", *self.options, "-wp-prover", "z3,cvc4", "-wp-timeout", "60"]
             return [*FRAMA_C, "-no-frama-c-stdlib", f"-cpp-extra-args={' '.join(cpp)}", *prove, *self.sources]
+        # Frama-C's own <stdatomic.h> says nothing of what its functions do.
+        cpp += ["-D__FC_STDATOMIC", "-include", f"{HERE}/include/atomics/stdatomic.h"]
         show = ["-eva", "-eva-no-show-progress"]
         return [*FRAMA_C, f"-cpp-extra-args={' '.join(cpp)}", *show, *self.options, *self.sources]
 
