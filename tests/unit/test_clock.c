@@ -52,21 +52,21 @@ static void test_half_the_range_separates_past_from_future(void)
 
 static void test_a_stamp_is_as_long_ago_as_the_timer_has_gone_since(void)
 {
-    TEST_ASSERT_EQUAL_UINT64(5000, canopy_time_of_stamp(5000, 77, 77, 16, 2000));
-    TEST_ASSERT_EQUAL_UINT64(4980, canopy_time_of_stamp(5000, 87, 77, 16, 2000)); /* a bit at 500 kbit/s */
+    TEST_ASSERT_EQUAL_UINT64(4998, canopy_time_of_stamp(5000, 77, 77, 16, 2000)); /* up to one count more */
+    TEST_ASSERT_EQUAL_UINT64(4978, canopy_time_of_stamp(5000, 87, 77, 16, 2000)); /* a bit at 500 kbit/s */
     TEST_ASSERT_EQUAL_UINT64(4999, canopy_time_of_stamp(5000, 1, 0, 32, 1)); /* rounded: never younger */
-    TEST_ASSERT_EQUAL_UINT64(4999, canopy_time_of_stamp(5000, 1000, 0, 32, 1));
-    TEST_ASSERT_EQUAL_UINT64(4998, canopy_time_of_stamp(5000, 1001, 0, 32, 1));
+    TEST_ASSERT_EQUAL_UINT64(4999, canopy_time_of_stamp(5000, 999, 0, 32, 1));
+    TEST_ASSERT_EQUAL_UINT64(4998, canopy_time_of_stamp(5000, 1000, 0, 32, 1));
 }
 
 static void test_a_stamp_is_right_across_the_turn_of_the_timer_and_of_time(void)
 {
-    TEST_ASSERT_EQUAL_UINT64(4980, canopy_time_of_stamp(5000, 3, 65529, 16, 2000));
-    TEST_ASSERT_EQUAL_UINT64(5000 - 65535, canopy_time_of_stamp(5000, 6, 7, 16, 1000));
-    TEST_ASSERT_EQUAL_UINT64(UINT64_C(10000000000) - 4294967295, /* 2^32 - 1 counts of 1 us */
+    TEST_ASSERT_EQUAL_UINT64(4978, canopy_time_of_stamp(5000, 3, 65529, 16, 2000));
+    TEST_ASSERT_EQUAL_UINT64(5000 - 65536, canopy_time_of_stamp(5000, 6, 7, 16, 1000));
+    TEST_ASSERT_EQUAL_UINT64(UINT64_C(10000000000) - 4294967296, /* 2^32 - 1 counts of 1 us, and one */
                              canopy_time_of_stamp(UINT64_C(10000000000), 6, 7, 32, 1000));
-    TEST_ASSERT_EQUAL_UINT64(4999, canopy_time_of_stamp(5000, 0, 1, 1, 1000));
-    TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, canopy_time_of_stamp(9, 10, 0, 16, 1000)); /* before time began again */
+    TEST_ASSERT_EQUAL_UINT64(4998, canopy_time_of_stamp(5000, 0, 1, 1, 1000));
+    TEST_ASSERT_EQUAL_UINT64(UINT64_MAX - 1, canopy_time_of_stamp(9, 10, 0, 16, 1000)); /* before time began again */
 }
 
 int main(void)
