@@ -28,7 +28,7 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test,differential,bench
+	$(SETUP)/make-venv can,lcm,test,verify,differential,bench
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
@@ -54,18 +54,18 @@ golden: ## write tests/golden anew from what the compiler makes now; read the di
 
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
+	$(SETUP)/make-venv can,lcm,test,verify,differential,bench,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,differential,bench,lint
+	$(SETUP)/make-venv can,lcm,test,verify,differential,bench,lint
 	$(SETUP)/lint --fix
 
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
-	$(SETUP)/make-venv can,lcm,test,differential
+	$(SETUP)/make-venv can,lcm,test,verify,differential
 	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
@@ -106,7 +106,7 @@ proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any inp
 
 bench: ## instructions, stack and memory of a tick, instructions of cycles, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench
-	$(SETUP)/make-venv can,lcm,test,differential,bench
+	$(SETUP)/make-venv can,lcm,test,verify,differential,bench
 	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md
 
 clean: ## remove everything that was built

@@ -9,6 +9,7 @@ import sys
 import click
 
 from canopy import __version__
+from canopy.escape.terminal import CleanCommand, echo
 
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
@@ -16,8 +17,10 @@ SUBCOMMANDS = {
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
+    "verify": ("canopy.verify.cli", "Prove what a tree guarantees, given a model of its leaves."),
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
+    "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "record": ("canopy.record", "Record a bus to a log that can be replayed."),
@@ -27,7 +30,7 @@ SUBCOMMANDS = {
 }
 
 
-class _LazyGroup(click.Group):
+class _LazyGroup(CleanCommand, click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(SUBCOMMANDS)
 
@@ -41,7 +44,7 @@ class _LazyGroup(click.Group):
             if error.name is None or error.name.startswith("canopy"):
                 raise
             extra = "can" if error.name == "can" else error.name
-            click.echo(
+            echo(
                 f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
             )
             sys.exit(1)

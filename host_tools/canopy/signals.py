@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -12,6 +13,8 @@ from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
 from cantools.database.errors import DecodeError
 
+from canopy.compiler.dbc_file import decode_dbc
+from canopy.files import FileError, read_bytes
 from canopy.model import Model, ModelError
 
 _CYCLES_TO_TIMEOUT = 5  # a message without GenMsgTimeoutTime is stale after so many of its cycles
@@ -115,7 +118,13 @@ def load_database(model: Model) -> Database:
         ModelError: It cannot be read.
     """
     try:
-        database = cantools.database.load_file(model.dbc, strict=False)
+        data = read_bytes(model.dbc)
+    except FileError as error:
+        raise ModelError(f"{model.dbc}: {error.problem}") from error
+    if model.dbc_hash not in (None, hashlib.sha256(data).hexdigest()[:16]):
+        raise ModelError(f"{model.dbc}: is not the DBC that {model.path.name} was written with: build again")
+    try:
+        database = cantools.database.load_string(decode_dbc(data), database_format="dbc", strict=False)
     except Exception as error:
         # cantools lets the exceptions of several parsers through.
         raise ModelError(f"{model.dbc}: is no DBC that cantools can read: {error}") from error

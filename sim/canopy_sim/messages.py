@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import can
-import cantools
 from cantools.database.can import Database, Message, Signal
 
+from canopy.compiler.dbc_file import load_dbc
+from canopy.compiler.errors import CompileError
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.plant import PostureMode, PowerMode
 
@@ -185,11 +186,9 @@ def load_messages(dbc: Path) -> RobotMessages:
         DescriptionError: The file cannot be read, is no DBC, or not one of this robot.
     """
     try:
-        database = cantools.database.load_file(dbc, database_format="dbc")
-    except (OSError, UnicodeDecodeError, cantools.Error) as error:
-        raise DescriptionError(f"{dbc}: {' '.join(str(error).split())}") from error
-    if not isinstance(database, Database):
-        raise DescriptionError(f"{dbc}: not a CAN database")
+        database = load_dbc(dbc)
+    except CompileError as error:
+        raise DescriptionError(f"{error.place}: {error.message}") from error
     try:
         return RobotMessages(database)
     except DescriptionError as error:

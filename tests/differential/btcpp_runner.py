@@ -18,23 +18,9 @@ from collections.abc import Callable
 
 import behaviortreepy as bt
 
+from canopy.semantics.spec import CONTINUE, HALTED, IDLE, START, STATUS_NAMES, Spec
 from differential.generate import NODES_MAX
-from differential.tree import (
-    CONTINUE,
-    ENTRIES,
-    HALTED,
-    IDLE,
-    SCRIPTED,
-    START,
-    STATUS_NAMES,
-    SWITCHED,
-    USER_LEAVES,
-    Outcome,
-    Spec,
-    Tree,
-    attributes,
-    tag,
-)
+from differential.tree import ENTRIES, SCRIPTED, SWITCHED, USER_LEAVES, Outcome, Tree, attributes, tag
 
 Answer = Callable[[int, int], object]
 _STATUSES = [getattr(bt.NodeStatus, name) for name in STATUS_NAMES]

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from canopy.semantics.spec import CALL_NAMES, STATUS_NAMES
 from differential.differences import Explained, run_differing_model
 from differential.engine import run_engine
 from differential.model import run_model
 from differential.shown import Shown
 from differential.shrink import shrink
 from differential.tally import Tally
-from differential.tree import CALL_NAMES, ENTRIES, STATUS_NAMES, Outcome, Result, Tree, code_name
+from differential.tree import ENTRIES, Outcome, Result, Tree, code_name
 
 BATCH = 500
 

@@ -8,20 +8,8 @@ import subprocess
 from pathlib import Path
 
 from canopy.compiler.node_types import node_types
-from differential.tree import (
-    ENTRIES,
-    IDLE,
-    OPERATIONS,
-    SCRIPT_LEAVES,
-    SHAPES,
-    USER_LEAVES,
-    WAS,
-    Outcome,
-    Result,
-    Script,
-    Spec,
-    Tree,
-)
+from canopy.semantics.spec import IDLE, WAS, Script, Spec
+from differential.tree import ENTRIES, OPERATIONS, SCRIPT_LEAVES, SHAPES, USER_LEAVES, Outcome, Result, Tree
 
 _HEADER = struct.Struct("<7H")
 _NODE = struct.Struct("<2B5H")

@@ -8,22 +8,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
+from canopy.semantics.spec import COMPARISONS, FAILURE, RUNNING, SKIPPED, SUCCESS, Script, Spec
 from differential.tree import (
     ASSIGNMENTS,
     BUILT_IN_LEAVES,
-    COMPARISONS,
     ENTRIES,
-    FAILURE,
     PRECONDITIONS,
-    RUNNING,
     SCRIPTED,
     SHAPES,
-    SKIPPED,
-    SUCCESS,
     SWITCHED,
     USER_LEAVES,
-    Script,
-    Spec,
     Tree,
 )
 

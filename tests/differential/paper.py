@@ -15,7 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from differential.tree import FAILURE, HALTED, RUNNING, SUCCESS, Spec, Tree
+from canopy.semantics.spec import FAILURE, HALTED, RUNNING, SUCCESS, Spec
+from differential.tree import Tree
 
 State = int
 Acting = frozenset[int]

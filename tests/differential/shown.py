@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from differential.model import COMPLETED
-from differential.tree import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, WAS, Outcome, Spec, Tree
+from canopy.semantics import COMPLETED
+from canopy.semantics.spec import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, WAS, Spec
+from differential.tree import Outcome, Tree
 
 SHOWN: dict[str, str] = {
     "root": "it resets a completed root",

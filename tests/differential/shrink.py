@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from differential.tree import SHAPES, SUCCESS, Spec, Tree
+from canopy.semantics.spec import SUCCESS, Spec
+from differential.tree import SHAPES, Tree
 
 ATTEMPTS_MAX = 1500
 

@@ -14,8 +14,9 @@ from typing import cast
 
 import pytest
 
-from differential.model import NODES, Loop, Node, World
-from differential.tree import FAILURE, IDLE, RUNNING, SCRIPTED, SKIPPED, SUCCESS, Script, Spec
+from canopy.semantics import NODES, Loop, Node, World
+from canopy.semantics.spec import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Script, Spec
+from differential.tree import SCRIPTED
 from unit.conformance.cases import Case, cases, left_out
 from unit.conformance.make_table import NODES as DEFINITIONS
 

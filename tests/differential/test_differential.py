@@ -12,7 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from differential import compare, differences, model
+from canopy import semantics as model
+from canopy.semantics import Node
+from canopy.semantics.spec import ATTRIBUTES, FAILURE, HALTED, RUNNING, SUCCESS, Spec
+from differential import compare, differences
 from differential.compare import (
     Report,
     compare_with_btcpp,
@@ -24,11 +27,11 @@ from differential.compare import (
 from differential.differences import RULES, can_load, run_differing_model
 from differential.engine import run_engine
 from differential.generate import DEPTH_MAX, NODES_MAX, Wanted, generate
-from differential.model import Node, run_model
+from differential.model import run_model
 from differential.paper import acted, experiment
 from differential.platforms import needs_btcpp
 from differential.settings import BTCPP_TREES, DEFAULT_SEED, MODEL_TREES, SEED, TIMEOUT_S
-from differential.tree import ATTRIBUTES, FAILURE, HALTED, RUNNING, SHAPES, SUCCESS, Spec, Tree, engine_kinds
+from differential.tree import SHAPES, Tree, engine_kinds
 
 Figure = Callable[[str], None]
 

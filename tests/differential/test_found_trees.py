@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from canopy.semantics.spec import ATTRIBUTES, FAILURE, RUNNING, SKIPPED, SUCCESS, Script, Spec
 from differential.compare import compare_with_btcpp
 from differential.differences import run_differing_model
 from differential.platforms import needs_btcpp
-from differential.tree import ATTRIBUTES, FAILURE, RUNNING, SKIPPED, SUCCESS, Script, Spec, Tree
+from differential.tree import Tree
 
 A, B = 0, 1
 """Entries."""

@@ -11,15 +11,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from canopy.compiler.node_types import node_types
-
-IDLE, RUNNING, SUCCESS, FAILURE, SKIPPED = range(5)
-STATUS_NAMES = ("IDLE", "RUNNING", "SUCCESS", "FAILURE", "SKIPPED")
-WAS = 8
-"""CANOPY_STATUS_WAS: in a status code, the node is IDLE and the low bits keep what it was."""
-
-START, CONTINUE, HALTED = range(3)
-CALL_NAMES = ("start", "running", "halted")
-"""Kinds of leaf calls: the one function of a Condition or SyncAction, or on_start; on_running; on_halted."""
+from canopy.semantics.spec import ATTRIBUTES, IDLE, SKIPPED, STATUS_NAMES, WAS, Script, Spec
 
 USER_LEAVES = ("Condition", "SyncAction", "StatefulAction")
 SCRIPT_LEAVES = ("Script", "ScriptCondition", "SetBlackboard")
@@ -37,26 +29,17 @@ SWITCHED = ENTRIES.index("s")
 OPERATIONS = ("<", "==", ":=", "+=", "value", "updates", "take")
 """What a script does with its entry and its value: a comparison, an assignment; what Switch asks, WasEntryUpdated and
 its like, and Loop: the entry's value, how often it was written, the next item of the list 1 to `value`."""
-COMPARISONS = ("<", "==")
 ASSIGNMENTS = (":=", "+=")
 
 
-class Script(NamedTuple):
-    """One script."""
-
-    operation: str
-    entry: int
-    value: int = 0
-
-    def text(self) -> str:
-        """It as it stands in the XML."""
-        name = ENTRIES[self.entry]
-        if self.operation == "take":
-            return ";".join(str(item) for item in range(1, self.value + 1))
-        return f"{{{name}}}" if self.operation in ("value", "updates") else f"{name} {self.operation} {self.value}"
+def script_text(script: Script) -> str:
+    """It as it stands in the XML."""
+    name = ENTRIES[script.entry]
+    if script.operation == "take":
+        return ";".join(str(item) for item in range(1, script.value + 1))
+    return f"{{{name}}}" if script.operation in ("value", "updates") else f"{name} {script.operation} {script.value}"
 
 
-ATTRIBUTES = ("_failureIf", "_successIf", "_skipIf", "_while", "_onSuccess", "_onFailure", "_post", "_onHalted")
 PRECONDITIONS = ATTRIBUTES[:4]
 
 
@@ -124,30 +107,6 @@ def engine_kinds() -> frozenset[str]:
 
 
 @dataclass
-class Spec:
-    """A node with what is below it. `answers`: what a leaf of the user's answers, one byte a tick.
-
-    The pre- and postconditions of a node are a node above it, Attributes, as in the engine.
-    """
-
-    kind: str
-    children: list[Spec]
-    parameters: tuple[int, ...] = ()
-    answers: bytes = b""
-    scripts: tuple[Script | None, ...] = ()
-
-    def walk(self) -> Iterator[Spec]:
-        """This node and all below it, depth first."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
-
-    def depth(self) -> int:
-        """Number of levels."""
-        return 1 + max((child.depth() for child in self.children), default=0)
-
-
-@dataclass
 class Tree:
     """What one run is made of. `times`: `now` of each tick [µs]; `halt_after`: ticks until the whole tree is halted."""
 
@@ -199,7 +158,7 @@ def attributes(spec: Spec) -> str:
         values[name] = STATUS_NAMES[value] if name in shape.statuses else str(value)
     for name, script in zip(shape.scripts, spec.scripts, strict=True):
         if script is not None:
-            values[name] = script.text()
+            values[name] = script_text(script)
             if spec.kind == "Loop":
                 values["value"] = f"{{{ENTRIES[script.entry]}}}"
             if spec.kind == "SetBlackboard":

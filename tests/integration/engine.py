@@ -87,11 +87,14 @@ class Engine:
         self._nodes = (_Node * len(table.rows))(
             *(_Node(r.node.type.number, r.asks, r.parent, r.end, r.state, r.leaf, r.parameter) for r in table.rows)
         )
-        self._leaves = (_Leaf * max(1, len(table.leaves)))(*(self._leaf(use.nodes) for use in table.leaves))
+        leaves = [self._leaf(use.nodes) for use in table.leaves]
+        if table.script_leaf:
+            leaves.append(self._script_leaf(table.scripts, ask))
+        self._leaves = (_Leaf * max(1, len(leaves)))(*leaves)
         self._parameters = (ctypes.c_int32 * max(1, len(table.parameters)))(*table.parameters)
         scripts = (_SCRIPT(lambda _application, script=script: ask(script)) for script in table.scripts)
         self._scripts = (_SCRIPT * max(1, len(table.scripts)))(*scripts)
-        counts = (len(table.rows), len(table.leaves), 0, len(table.scripts), len(table.parameters), table.words)
+        counts = (len(table.rows), len(leaves), 0, len(table.scripts), len(table.parameters), table.words)
         self._tree = _Tree(self._nodes, self._leaves, None, self._scripts, self._parameters, *counts)
         self._status = (ctypes.c_uint8 * len(table.rows))()
         self._words = (ctypes.c_uint16 * max(1, table.words))()
@@ -113,6 +116,11 @@ class Engine:
 
         halted = call("halt")
         return _Leaf(_TICK(call("tick")), _TICK(call("running")), _HALTED(lambda a, p: (halted(a, p), None)[1]))
+
+    @staticmethod
+    def _script_leaf(scripts: tuple[Script, ...], ask: Callable[[Script], int]) -> _Leaf:
+        """The leaf that runs Script and ScriptCondition."""
+        return _Leaf(_TICK(lambda _application, number: SUCCESS if ask(scripts[number]) else FAILURE))
 
     def tick(self, now_us: int = 0) -> int:
         """One tick; `calls` is empty before it."""

@@ -28,7 +28,11 @@ def rover(tmp_path: Path, commands: int, cycle_ms: int) -> Bus:
     """A bus with so many commands of 8 bytes."""
     lines = ["BU_: Controller Drive"]
     for number in range(commands):
-        lines += ["", f"BO_ {0x200 + number} Command{number}: 8 Controller", ' SG_ Speed : 0|8@1+ (1,0) [0|255] "" Drive']
+        lines += [
+            "",
+            f"BO_ {0x200 + number} Command{number}: 8 Controller",
+            ' SG_ Speed : 0|8@1+ (1,0) [0|255] "" Drive',
+        ]
     lines += [
         "",
         'BA_DEF_ BO_ "GenMsgCycleTime" INT 0 60000;',

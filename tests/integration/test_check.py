@@ -32,6 +32,7 @@ MODEL = """\
     <Action ID="Fails"><MetadataFields><Metadata returns="FAILURE"/></MetadataFields></Action>
     <Action ID="Recharge"><MetadataFields><Metadata moves="Battery.Level"/></MetadataFields></Action>
     <Action ID="Charges"><MetadataFields><Metadata moves="B.L"/></MetadataFields></Action>
+    <Action ID="KeepPower"><MetadataFields><Metadata safeguards="Battery.Level"/></MetadataFields></Action>
     <Action ID="OpenDoor"/>
     <Action ID="PassDoor"/>
     <Action ID="CloseDoor"/>
@@ -54,6 +55,30 @@ TREE = """\
 
 # rule, a tree in which it fires with this text, a tree like it in which it does not
 CASES = [
+    ("non-reactive", "<Sequence><Ready/><Go/></Sequence>", "nothing else is ticked while <Go> is RUNNING",
+     "<ReactiveSequence><Ready/><Go/></ReactiveSequence>"),
+    ("non-reactive", "<ReactiveSequence><Sequence><Ready/><Go/></Sequence><Blink/></ReactiveSequence>", "<Go>",
+     "<Sequence _while='Battery.Level > 20'><Ready/><Go/></Sequence>"),
+    ("non-reactive", "<Fallback><Ready/><Timeout msec='9'><Go/></Timeout></Fallback>", "<Go>",
+     "<Fallback><Ready/><Parallel><Go/><DoorOpen/></Parallel></Fallback>"),
+    ("implicit-sequence", "<ReactiveSequence><OpenDoor/><PassDoor/></ReactiveSequence>",
+     "<PassDoor> runs only while <OpenDoor> succeeds again in every tick",
+     "<ReactiveFallback><PassDoor/><OpenDoor/></ReactiveFallback>"),
+    ("implicit-sequence", "<ReactiveSequence><Ready/><Go/><Walk/></ReactiveSequence>", "<Walk>",
+     "<ReactiveSequence><Stop/><Go/></ReactiveSequence>"),
+    ("implicit-sequence", "<ReactiveSequence><Go/><Speak/></ReactiveSequence>", "<Speak>",
+     "<ReactiveSequence><KeepPower/><Go/></ReactiveSequence>"),
+    ("unguarded-safety", "<ReactiveFallback><Recharge/><KeepPower/></ReactiveFallback>",
+     "<Recharge> moves 'Battery.Level', and <KeepPower> (line 3), which keeps it safe, is not asked before it",
+     "<ReactiveSequence><KeepPower/><Recharge/></ReactiveSequence>"),
+    ("unguarded-safety", "<Sequence><KeepPower/><Recharge/></Sequence>", "<Recharge>",
+     "<ReactiveSequence><KeepPower/><Sequence><Go/><Recharge/></Sequence></ReactiveSequence>"),
+    ("unguarded-safety",
+     "<ReactiveSequence><ReactiveFallback><Ready/><KeepPower/></ReactiveFallback><Recharge/></ReactiveSequence>",
+     "<Recharge>",
+     "<ReactiveSequence><ForceSuccess><KeepPower/></ForceSuccess><Recharge/></ReactiveSequence>"),
+    ("unguarded-safety", "<ReactiveSequence><Sequence><KeepPower/></Sequence><Recharge/></ReactiveSequence>",
+     "<Recharge>", "<Sequence><Recharge/><Charges/></Sequence>"),
     ("unreachable-child", "<Fallback><Stop/><Go/></Fallback>",
      "<Go> can never be ticked: <Stop> before it (line 3) only",
      "<Fallback><Go/><Stop/></Fallback>"),

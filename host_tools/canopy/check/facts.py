@@ -19,6 +19,14 @@ PARALLELS = ("Parallel", "ParallelAll", "ReactiveParallel")
 REACTIVE = ("ReactiveSequence", "ReactiveFallback")
 
 
+STEPS = 3_000_000
+"""What a rule may look at in one tree: rules compare pairs, and a tree may have 65,534 nodes."""
+
+
+class TooLargeError(Exception):
+    """A rule has used up its STEPS."""
+
+
 class Facts:
     """The checked tree, its nodes in depth-first order, and what each can return."""
 
@@ -30,7 +38,22 @@ class Facts:
         self._end: list[int] = []
         self._outcomes: dict[int, Outcome] = {}
         self._elements: dict[str, dict[tuple[int, int], Element]] = {}
+        self._left = STEPS
         self._lay_out()
+
+    def begin_rule(self) -> None:
+        """Gives the next rule its STEPS."""
+        self._left = STEPS
+
+    def spend(self, steps: int = 1) -> None:
+        """Rules call this where they look at pairs.
+
+        Raises:
+            TooLargeError: this was one too many.
+        """
+        self._left -= steps
+        if self._left < 0:
+            raise TooLargeError
 
     def _lay_out(self) -> None:
         waiting = [self.tree.root]
@@ -63,6 +86,7 @@ class Facts:
     def below(self, node: Node) -> list[Node]:
         """The node and all nodes below it, depth first."""
         index = self._index[id(node)]
+        self.spend(self._end[index] - index)
         return self.nodes[index : self._end[index]]
 
     def leaves(self, node: Node) -> Iterator[tuple[Node, Leaf]]:

@@ -33,11 +33,15 @@ OPPOSITE_PHRASES = {("turn", "on"): ("turn", "off"), ("switch", "on"): ("switch"
 FILLERS = {"is", "are", "has", "have", "was", "the", "a"}
 
 
-def _words(leaf: Leaf) -> list[str]:
-    return [word for word in snake(leaf.id).split("_") if word]
-
-
 @cache
+def _words_of(leaf_id: str) -> list[str]:
+    return [word for word in snake(leaf_id).split("_") if word]
+
+
+def _words(leaf: Leaf) -> list[str]:
+    return _words_of(leaf.id)
+
+
 def undoes(later: Leaf, earlier: Leaf) -> bool:
     """Does `later` clean up what `earlier` has done?"""
     if later.undoes:
@@ -61,10 +65,14 @@ def _stem(word: str) -> str:
     return word
 
 
-@cache
 def achieves(action: Leaf, condition: Leaf) -> bool:
     """Does `action` make `condition` true? OpenDoor achieves DoorOpen, IsDoorOpen, and DoorOpened."""
     if action.achieves:
         return condition.id in action.achieves
-    wanted = sorted(_stem(word) for word in _words(condition) if word not in FILLERS)
-    return len(wanted) > 1 and wanted == sorted(_stem(word) for word in _words(action) if word not in FILLERS)
+    wanted = _stems(condition.id)
+    return len(wanted) > 1 and wanted == _stems(action.id)
+
+
+@cache
+def _stems(leaf_id: str) -> list[str]:
+    return sorted(_stem(word) for word in _words_of(leaf_id) if word not in FILLERS)

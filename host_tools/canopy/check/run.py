@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from canopy.check.facts import Facts, elements_by_place
+from canopy.check.facts import Facts, TooLargeError, elements_by_place
 from canopy.check.registry import Hit, Rule
 from canopy.check.rules import all_rules
 from canopy.check.rules.declarations import writing_conditions
@@ -96,6 +96,19 @@ def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Fin
     return [_finding(rule, hit) for hit in hits] if rule in rules else []
 
 
+def _ask(rule: Rule, facts: Facts) -> Iterator[tuple[Rule, Hit]]:
+    """What a rule finds; where the tree is too large for it, that."""
+    facts.begin_rule()
+    try:
+        for hit in rule.run(facts):
+            facts.spend()
+            yield rule, hit
+    except TooLargeError:
+        root = facts.tree.root
+        message = f"the tree '{facts.tree.id}' is too large for this rule, which looked at a part of it only"
+        yield rule, Hit(root.place, message, "Divide the tree, or leave the rule out: --disable.")
+
+
 def _unused(tree: Tree, types: Options, rules: list[Rule]) -> Iterator[tuple[Rule, Hit]]:
     """What `rules` find in the file's trees that are no part of its main tree; or why one would not compile."""
     for tree_id, found in read_unused_trees(tree.path, types, tree):
@@ -106,7 +119,7 @@ def _unused(tree: Tree, types: Options, rules: list[Rule]) -> Iterator[tuple[Rul
         facts = Facts(found)
         for rule in rules:
             if rule.id not in OF_THE_WHOLE:
-                yield from ((rule, hit) for hit in rule.run(facts))
+                yield from _ask(rule, facts)
 
 
 def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, types: Options | None = None) -> Report:
@@ -125,7 +138,7 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
         return report
     files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
     allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
-    hits = [(rule, hit) for rule in wanted for hit in rule.run(facts)]
+    hits = [found for rule in wanted for found in _ask(rule, facts)]
     if any(rule.id == "unused-tree" for rule in wanted):
         hits += _unused(facts.tree, types, wanted)
     seen: set[tuple[str, Place, str]] = set()  # a tree that is part of two others is seen twice

@@ -102,11 +102,22 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
     bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8])
     trace_state = struct_size([pointer, u16, u8, u8])
     rx_state = struct_size([u64, *[u8] * 6, u16])
-    ring = struct_size([pointer, *[u32] * 6])
     tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
     tx_trace = struct_size([u64, u32, *[u8] * 9])
     tx_mailbox = struct_size([u64, u32, u16, u8])
-    tx = struct_size([*[pointer] * 4, ring, u16, *[u8] * 5, tx_trace, array(tx_mailbox, MAILBOXES_MAX), *[u32] * 5])
+    tx = struct_size(
+        [
+            *[pointer] * 5,
+            u32,
+            u16,
+            u8,
+            *[u32] * 3,
+            *[u8] * 4,
+            u64,
+            array(tx_mailbox, MAILBOXES_MAX),
+            *[u32] * 5,
+        ]
+    )
     image_in = struct_size([u64, u8, u8, *(_message_struct(m, received=True) for m in bus.receive)])
     image_out = struct_size(
         [array(u32, max(1, -(-outputs // 32))), u32, u8, *(_message_struct(m, received=False) for m in bus.send)]

@@ -31,20 +31,30 @@ _APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")
 _MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")
 
 
-def _free(wanted: str, taken: Iterable[set[str]], prefix: str = "") -> str:
+class _Names(set[str]):
+    """Names that are taken, and the last number that was put behind each."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__(names)
+        self.last: dict[str, int] = {}
+
+
+def _free(wanted: str, taken: Iterable[_Names], prefix: str = "") -> str:
     """`wanted`, or with the first number from 2 that makes it new in all sets, which get it."""
     sets = list(taken)
-    number, name = 1, wanted
+    stem, name = wanted.rstrip("_"), wanted
+    number = sets[0].last.get(prefix + wanted, 1)
     while name in sets[0] or any(prefix + name in names for names in sets[1:]):
         number += 1
-        name = f"{wanted.rstrip('_')}_{number}"
+        name = f"{stem}_{number}"
+    sets[0].last[prefix + wanted] = number
     sets[0].add(name)
     for names in sets[1:]:
         names.add(prefix + name)
     return name
 
 
-def _enumerators(signal: Signal, stem: str, everything: set[str]) -> tuple[Enumerator, ...]:
+def _enumerators(signal: Signal, stem: str, everything: _Names) -> tuple[Enumerator, ...]:
     result = []
     for value, text in signal.choices:
         word = snake(text).strip("_") or f"value_{'minus_' if value < 0 else ''}{abs(value)}"
@@ -53,8 +63,8 @@ def _enumerators(signal: Signal, stem: str, everything: set[str]) -> tuple[Enume
     return tuple(result)
 
 
-def _name_signals(message: Message, everything: set[str]) -> Message:
-    members = set(_TAKEN)
+def _name_signals(message: Message, everything: _Names) -> Message:
+    members = _Names(*_TAKEN)
     named = []
     for signal in message.signals:
         wanted = snake(signal.name)
@@ -76,8 +86,8 @@ def name_messages(messages: tuple[Message, ...]) -> tuple[Message, ...]:
 
     Names of messages come first, so that no signal takes one from them.
     """
-    members = {*_TAKEN, *_IMAGE_MEMBERS}
-    everything = {*_BUS_WORDS, *_APPLICATION_WORDS}
+    members = _Names(*_TAKEN, *_IMAGE_MEMBERS)
+    everything = _Names(*_BUS_WORDS, *_APPLICATION_WORDS)
     named = []
     for message in messages:
         wanted = snake(message.name)

@@ -14,10 +14,46 @@ import cantools.database.can
 from cantools.database.errors import Error as DatabaseError
 
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.files import FileError, read_bytes
 
 MAX_BYTES = 16 * 1024 * 1024
+MAX_SIGNALS = 2_048  # of a message
 MAX_MESSAGE_BYTES = 1785  # of J1939's transport protocol
 _MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:\s*(\d+)")
+
+
+def decode_dbc(data: bytes) -> str:
+    """The text of a DBC: in UTF-8 if it is that, else in Windows-1252, in which most tools write DBCs.
+
+    Raises:
+        UnicodeDecodeError: a byte stands for no character in either.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_dbc(path: Path) -> bytes:
+    """The bytes of a DBC file.
+
+    Raises:
+        CompileError: it cannot be read, or has a byte that stands for no character.
+    """
+    try:
+        data = read_bytes(path, MAX_BYTES)
+        decode_dbc(data)
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem) from error
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise CompileError(
+            Place(str(path), line),
+            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
+            "save the file as UTF-8",
+        ) from None
+    return data
 
 
 def load_dbc(path: Path) -> Any:
@@ -27,14 +63,11 @@ def load_dbc(path: Path) -> Any:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
     """
     place = Place(str(path))
+    text = decode_dbc(read_dbc(path))
+    _check_sizes(path, text)
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise CompileError(place, f"the file has {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
-        _check_lengths(path)
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
-        database = cantools.database.load_file(str(path), database_format="dbc", strict=True)
-    except OSError as error:
-        raise CompileError(place, f"cannot be read: {error.strerror}") from error
+        database = cantools.database.load_string(text, database_format="dbc", strict=True)
     except (DatabaseError, ValueError, KeyError, ArithmeticError) as error:
         raise CompileError(place, f"not a DBC that can be read: {error}") from error
     if not isinstance(database, cantools.database.can.Database):
@@ -43,16 +76,19 @@ def load_dbc(path: Path) -> Any:
     return database
 
 
-def _check_lengths(path: Path) -> None:
-    """Refuses messages longer than any protocol's: cantools takes memory and time for each bit of them."""
-    for line_number, line in enumerate(path.read_text(encoding="cp1252", errors="replace").splitlines(), 1):
+def _check_sizes(path: Path, text: str) -> None:
+    """Refuses messages that nobody sends: cantools takes time for each bit of them, and for each pair of signals."""
+    name, signals = "", 0
+    for line_number, line in enumerate(text.splitlines(), 1):
+        place = Place(str(path), line_number)
         found = _MESSAGE_LENGTH.match(line)
-        if found is not None and (len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES):
-            raise CompileError(
-                Place(str(path), line_number),
-                f"message '{found[1]}' is longer than {MAX_MESSAGE_BYTES} bytes",
-                "CAN FD has 64",
-            )
+        if found is not None:
+            name, signals = found[1], 0
+            if len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES:
+                raise CompileError(place, f"message '{name}' is longer than {MAX_MESSAGE_BYTES} bytes", "CAN FD has 64")
+        signals += line.lstrip().startswith("SG_ ")
+        if signals > MAX_SIGNALS:
+            raise CompileError(place, f"message '{name}' has more than {MAX_SIGNALS} signals")
 
 
 def _check_unique(place: Place, database: Any) -> None:

@@ -15,15 +15,18 @@ write to its output ports of texts, separated by semicolons: texts are constants
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 
-Metadata that only `canopy check` uses (docs/lint.md), and that changes no generated code: `returns` (the statuses that
-the leaf can return, if fewer than its kind allows), `undoes` and `achieves` (IDs of leaves: the action that this one
-cleans up after, the condition that it makes true), `moves` (signals that its acting changes), `hysteresis` (what keeps
-a condition's threshold from chattering).
+Metadata that only `canopy check` and `canopy fmt --simplify` use (docs/lint.md, docs/tools.md), and that changes no
+generated code: `returns` (the statuses that the leaf can return, if fewer than its kind allows), `undoes` and
+`achieves` (IDs of leaves: the action that this one cleans up after, the condition that it makes true), `moves` (signals
+that its acting changes), `safeguards` (signals that it keeps in their safe range), `hysteresis` (what keeps a
+condition's threshold from chattering), `holds` (the comparison of a signal with a number that a condition is).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
@@ -43,6 +46,8 @@ METADATA = (
     "achieves",
     "moves",
     "hysteresis",
+    "holds",
+    "safeguards",
 )
 ACTION_KINDS = ("SyncAction", "StatefulAction")
 INNER_KINDS = ("Control", "Decorator")
@@ -71,7 +76,7 @@ class Port:
     direction: Literal["in", "out", "inout"] = "in"
     capacity: int = 0
 
-    @property
+    @cached_property
     def c_name(self) -> str:
         """The member's name in the ports struct."""
         return snake(self.name)
@@ -103,9 +108,11 @@ class Leaf:
     achieves: tuple[str, ...] = ()
     moves: tuple[str, ...] = ()
     hysteresis: str = ""
+    holds: str = ""
+    safeguards: tuple[str, ...] = ()
     problem: UnsupportedTypeError | None = field(default=None, compare=False)
 
-    @property
+    @cached_property
     def c_name(self) -> str:
         """Stem of the C functions: `walk_home` of `WalkHome`."""
         return snake(self.id)
@@ -126,6 +133,8 @@ class Declarations:
     """What the models of all files declare: the user's nodes, and the ports of trees, by ID."""
 
     leaves: dict[str, Leaf] = field(default_factory=dict)
+    c_names: dict[str, Leaf] = field(default_factory=dict)
+    """The same leaves, by their C names."""
     subtrees: dict[str, tuple[Port, ...]] = field(default_factory=dict)
 
 
@@ -133,6 +142,7 @@ class Declarations:
 class _Draft:
     metadata: dict[str, tuple[str, Place]] = field(default_factory=dict)
     ports: list[Port] = field(default_factory=list)
+    c_names: set[str] = field(default_factory=set)
     problem: UnsupportedTypeError | None = None
 
 
@@ -181,9 +191,10 @@ def _words(draft: _Draft, key: str) -> tuple[str, ...]:
 def _texts(draft: _Draft, leaf_id: str) -> tuple[str, ...]:
     text, place = draft.metadata.get("texts", ("", Place("")))
     texts = tuple(part.strip() for part in text.split(";") if part.strip())
-    names = [snake(part) for part in texts]
-    for part, name in zip(texts, names, strict=True):
-        if not name.strip("_") or names.count(name) > 1:
+    names = Counter(map(snake, texts))
+    for part in texts:
+        name = snake(part)
+        if not name.strip("_") or names[name] > 1:
             raise CompileError(place, f"texts of '{leaf_id}': '{part}' gives no C name of its own, but '{name}'")
     return texts
 
@@ -209,9 +220,10 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
             except UnsupportedTypeError as error:
                 draft.problem = draft.problem or error
                 continue
-            if any(port.c_name == other.c_name for other in draft.ports):
+            if port.c_name in draft.c_names:
                 raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
             draft.ports.append(port)
+            draft.c_names.add(port.c_name)
         elif child.tag == "MetadataFields":
             _read_metadata(child, draft)
         elif child.tag != "description":
@@ -258,6 +270,8 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         achieves=_words(draft, "achieves"),
         moves=_words(draft, "moves"),
         hysteresis=draft.metadata.get("hysteresis", ("", None))[0],
+        safeguards=_words(draft, "safeguards"),
+        holds=draft.metadata.get("holds", ("", None))[0],
         problem=draft.problem,
     )
 
@@ -290,10 +304,10 @@ def read_model(model: Element, into: Declarations, options: Options, built_in: f
                 raise CompileError(element.place, f"'{node_id}' is the name of a built-in node", "choose another ID")
             continue
         leaf = _read_leaf(element, options)
-        same = [other for other in into.leaves.values() if other.id == leaf.id or other.c_name == leaf.c_name]
-        if same and (same[0] != leaf or leaf.id in seen):
+        same = into.c_names.setdefault(leaf.c_name, leaf)
+        if same is not leaf and (same != leaf or leaf.id in seen):
             raise CompileError(
-                leaf.place, f"'{leaf.id}' is declared again (or has the same C name)", f"first: {same[0].place}"
+                leaf.place, f"'{leaf.id}' is declared again (or has the same C name)", f"first: {same.place}"
             )
         seen.add(leaf.id)
         into.leaves.setdefault(leaf.id, leaf)

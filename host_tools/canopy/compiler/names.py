@@ -59,8 +59,8 @@ C_KEYWORDS = frozenset(
 def snake(name: str) -> str:
     """`WalkHome`, `walk-home` and `Walk Home` become `walk_home`; `E2E_CRC` becomes `e2e_crc`."""
     text = re.sub(r"[^0-9A-Za-z]+", "_", name)
-    text = re.sub(r"([a-z])([A-Z])", r"\1_\2", text)
-    text = re.sub(r"([A-Z0-9]+)([A-Z][a-z])", r"\1_\2", text)
+    # Between aB and before the last capital of ABc; looking back and ahead takes no longer for a longer name.
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z0-9])(?=[A-Z][a-z])", "_", text)
     text = re.sub(r"_+", "_", text).strip("_").lower()
     if not text or text[0].isdigit() or text in C_KEYWORDS:
         text = f"_{text}" if text and text[0].isdigit() else f"{text}_"

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import tempfile
 from pathlib import Path
 
 import click
 
 from canopy.compiler.errors import CompileError, Place
+from canopy.escape.terminal import echo, echo_lines
+from canopy.files import LARGEST, FileError, read_bytes, write_files
 from canopy.fmt.document import read_document
+from canopy.fmt.simplify_file import simplify_bytes
 from canopy.fmt.writer import write_document
 
 WOULD_CHANGE = 1
@@ -23,36 +24,58 @@ def format_bytes(data: bytes, file: str) -> bytes:
     return write_document(read_document(data, file)).encode()
 
 
-def _replace(path: Path, data: bytes) -> None:
-    """Writes the whole file or nothing; keeps its permissions, and follows a link to it."""
-    target = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(temporary, target.stat().st_mode & 0o7777)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+def _simplified(path: Path, facts: Path | None) -> bytes:
+    formatted, reports = simplify_bytes(path, facts)
+    for report in reports:
+        echo(f"{path}: {report}", err=True)
+    return formatted
 
 
-def _format_file(path: Path, check: bool) -> bool:
-    """Formats a file in place, unless `check`. Was it not in canonical form?"""
+def _format_file(path: Path, check: bool, simplify: bool, facts: Path | None) -> bool:
+    """Formats a file in place, unless `check`. Was it not in canonical form, or not simple?"""
     try:
-        data = path.read_bytes()
-        formatted = format_bytes(data, str(path))
+        data = read_bytes(path)
+        formatted = _simplified(path, facts) if simplify else format_bytes(data, str(path))
         if formatted != data and not check:
-            _replace(path, formatted)
+            target = path.resolve()  # a link to a file stays one
+            write_files({target: formatted}, mode=target.stat().st_mode & 0o7777)
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem) from error
     except OSError as error:
         raise CompileError(Place(str(path)), f"cannot be read or written: {error.strerror}") from error
     return formatted != data
 
 
+def _found(check: bool, simplify: bool) -> str:
+    """What is said about a file that changes."""
+    if check:
+        return "not in canonical form, or not simple" if simplify else "not in canonical form"
+    return "formatted"
+
+
+def _read_input() -> bytes:
+    """Standard input, and no more of it than of a file."""
+    return sys.stdin.buffer.read(LARGEST + 1)
+
+
+def _print(formatted: bytes) -> None:
+    """Bytes for a pipe; a terminal does not get a comment's control characters."""
+    if sys.stdout.isatty():
+        echo_lines(formatted.decode())
+    else:
+        sys.stdout.buffer.write(formatted)
+
+
 @click.command()
 @click.argument("files", metavar="FILE…", nargs=-1, required=True)
 @click.option("--check", is_flag=True, help="Change nothing; exit with status 1 if a file is not in canonical form.")
-def command(files: tuple[str, ...], check: bool) -> None:
+@click.option("--simplify", is_flag=True, help="Also remove what cannot matter; each step is proved.")
+@click.option(
+    "--facts",
+    type=click.Path(path_type=Path),
+    help="What is known of the leaves, for --simplify: 'A implies B', 'A returns RUNNING', …",
+)
+def command(files: tuple[str, ...], check: bool, simplify: bool, facts: Path | None) -> None:
     """Write tree files in one canonical form, without loss (docs/tools.md).
 
     `-` formats standard input to standard output.
@@ -64,26 +87,31 @@ def command(files: tuple[str, ...], check: bool) -> None:
       canopy fmt trees/*.xml
       canopy fmt --check trees/*.xml
       canopy fmt - < drawn.xml > tidy.xml
+      canopy fmt --simplify --facts robot.facts trees/*.xml
     """
+    if facts is not None and not simplify:
+        raise click.UsageError("--facts goes with --simplify")
+    if simplify and "-" in files:
+        raise click.UsageError("--simplify needs files: what leaves are declared may stand in others that they include")
     changed = unreadable = False
     for name in files:
         try:
             if name == "-":
-                data = sys.stdin.buffer.read()
+                data = _read_input()
                 formatted = format_bytes(data, "<stdin>")
                 differs = formatted != data
                 if not check:
-                    sys.stdout.buffer.write(formatted)
+                    _print(formatted)
                     continue
             else:
-                differs = _format_file(Path(name), check)
+                differs = _format_file(Path(name), check, simplify, facts)
         except CompileError as error:
-            click.echo(str(error), err=True)
+            echo_lines(str(error), err=True)
             unreadable = True
             continue
         if differs:
             changed = True
-            click.echo(f"{name}: {'not in canonical form' if check else 'formatted'}", err=check)
+            echo(f"{name}: {_found(check, simplify)}", err=check)
     if unreadable:
         sys.exit(INPUT_ERROR)
     sys.exit(WOULD_CHANGE if check and changed else 0)

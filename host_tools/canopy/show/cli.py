@@ -3,32 +3,43 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from canopy.compiler.cli import main_tree_option, package_option, read_packages
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.output import fail
 from canopy.compiler.port_types import ANY_TYPE
-from canopy.compiler.tree_reader import read_tree
+from canopy.compiler.tree_reader import Tree, read_tree
+from canopy.escape.terminal import echo_lines
+from canopy.files import FileError, write_files
 from canopy.show.dot import dot
+from canopy.show.order import in_order
 from canopy.show.svg import svg
 from canopy.show.terminal import print_tree
 
-INPUT_ERROR = 2
+MOST_CELLS = 10_000_000
+
+
+def _check_size(tree: Tree) -> None:
+    """A drawing has a column for each level, and takes time and room for each node in it."""
+    cells = sum(depth for _, _, depth in in_order(tree.root))
+    if cells > MOST_CELLS:
+        raise CompileError(tree.root.place, "the tree is too deep to be drawn", "draw a part of it: --main-tree")
 
 
 def _write(target: str, text: str) -> None:
     if target == "-":
-        click.echo(text, nl=False)
+        echo_lines(text)
         return
     try:
-        Path(target).write_text(text, encoding="utf-8")
+        write_files({Path(target): text.encode()})
     except OSError as error:
-        click.echo(f"{target}: error: cannot be written: {error.strerror}", err=True)
-        sys.exit(INPUT_ERROR)
+        fail(CompileError(Place(target), f"cannot be written: {error.strerror}"))
+    except FileError as error:
+        fail(CompileError(Place(target), f"cannot be written: {error.problem}"))
 
 
 @click.command()
@@ -57,9 +68,9 @@ def command(
     """
     try:
         checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages), main_tree=main_tree))
+        _check_size(checked)
     except CompileError as error:
-        click.echo(str(error), err=True)
-        sys.exit(INPUT_ERROR)
+        fail(error)
     if svg_file is not None:
         _write(svg_file, svg(checked))
     if dot_file is not None:

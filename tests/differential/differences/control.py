@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from differential import model
+from canopy import semantics as model
+from canopy.semantics import COMPLETED
+from canopy.semantics.spec import FAILURE, IDLE, RUNNING, SKIPPED
 from differential.differences.leaves import StatefulAction
 from differential.differences.node import BtCppNode, bare
 from differential.differences.rules import ThrownError
-from differential.model import COMPLETED
-from differential.tree import FAILURE, IDLE, RUNNING, SKIPPED
 
 
 class InOrder(BtCppNode, model.InOrder):

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from differential import model
+from canopy import semantics as model
+from canopy.semantics import COMPLETED
+from canopy.semantics.spec import IDLE, RUNNING, SKIPPED
 from differential.differences.node import BtCppNode, was_skipped
-from differential.model import COMPLETED
-from differential.tree import IDLE, RUNNING, SKIPPED
 
 
 class Decorator(BtCppNode, model.Decorator):

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from differential import model
+from canopy import semantics as model
+from canopy.semantics import COMPLETED
+from canopy.semantics.spec import RUNNING, SKIPPED
 from differential.differences.node import BtCppNode
-from differential.model import COMPLETED
-from differential.tree import RUNNING, SKIPPED
 
 
 class Condition(BtCppNode, model.Condition):

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from differential.tree import Spec, Tree
+from canopy.semantics.spec import Spec
+from differential.tree import Tree
 
 
 def _element(spec: Spec) -> Spec:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from canopy.semantics import Node
+from canopy.semantics.spec import IDLE, RUNNING, SKIPPED
 from differential.differences.rules import BtCppWorld
-from differential.model import Node
-from differential.tree import IDLE, RUNNING, SKIPPED
 
 
 class BtCppNode(Node):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from canopy.semantics import Node
 from differential.differences.control import (
     AsyncFallback,
     AsyncSequence,
@@ -35,7 +36,6 @@ from differential.differences.scripts import (
     SetBlackboard,
     Switch,
 )
-from differential.model import Node
 
 NODES: dict[str, type[Node]] = {
     node.__name__: node

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from differential.model import World
+from canopy.semantics import World
+from differential.tree import ENTRIES
 
 RULES: dict[str, str] = {
     "skipped condition": "IfThenElse and WhileDoElse throw when their condition is SKIPPED",
@@ -31,7 +32,7 @@ class BtCppWorld(World):
     """Notes which rules fired in the tick under way."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(len(ENTRIES))
         self.fired: set[str] = set()
 
     def differs(self, rule: str) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from canopy.semantics import COMPLETED
+from canopy.semantics.spec import IDLE, RUNNING
 from differential.differences.node import BtCppNode, bare, was_skipped
 from differential.differences.nodes import NODES
 from differential.differences.rules import BtCppWorld, ThrownError
 from differential.differences.scripts import Attributes
-from differential.model import COMPLETED, ModelTree
-from differential.tree import IDLE, RUNNING, Outcome, Tree
+from differential.model import ModelTree
+from differential.tree import Outcome, Tree
 
 
 @dataclass

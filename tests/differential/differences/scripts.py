@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from differential import model
+from canopy import semantics as model
+from canopy.semantics import COMPLETED, Node
+from canopy.semantics.spec import ATTRIBUTES, IDLE, RUNNING, SKIPPED
 from differential.differences.decorators import Decorator
 from differential.differences.node import BtCppNode, was_skipped
-from differential.model import COMPLETED, Node
-from differential.tree import ATTRIBUTES, IDLE, RUNNING, SKIPPED
 
 
 class Script(BtCppNode, model.Script):

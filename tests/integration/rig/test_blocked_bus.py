@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A bus that lets nothing through for a while: what leaves afterwards, and how old it is. Inside tests/rig/with-vcan."""
+"""A bus that lets nothing through for a while: what leaves afterwards, and how old it is. In tests/rig/with-vcan."""
 
 from __future__ import annotations
 

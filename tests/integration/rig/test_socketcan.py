@@ -363,7 +363,7 @@ def test_frames_of_a_long_queue_are_each_as_old_as_they_are(probe: CanProbe) -> 
     for number in range(40):
         assert probe.receive() == f"{0x100 + number:03X}#"
         arrived = time.monotonic() - int(probe.ask("age")) * 1e-6
-        assert sent[number] - 0.03 <= arrived <= (sent + [time.monotonic()])[number + 1] + 0.03
+        assert sent[number] - 0.03 <= arrived <= [*sent, time.monotonic()][number + 1] + 0.03
 
 
 def test_python_can_as_the_peer(probe: CanProbe) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""vcan interfaces with an echo, blocked buses, and what is on the wire and how old it is. Inside tests/rig/with-vcan."""
+"""vcan interfaces with an echo, blocked buses, and what is on the wire and how old it is. In tests/rig/with-vcan."""
 
 from __future__ import annotations
 

@@ -24,6 +24,7 @@ def _cleaned_up(facts: Facts, parent: Node, opener: Leaf, failing: Node) -> bool
     node: Node = parent
     above = facts.parent(node)
     while above is not None:
+        facts.spend(len(above.children))
         place = next(index for index, child in enumerate(above.children) if child is node)
         if above.type.name not in SEQUENCES and any(
             undoes(leaf, opener) for later in above.children[place + 1 :] for _, leaf in facts.leaves(later)
@@ -53,9 +54,11 @@ def _skipped_in(facts: Facts, parent: Node) -> Iterator[Hit]:
     for index, child in enumerate(parent.children):
         cleaner = through_decorators(child)
         for earlier, opener in done.values():
+            facts.spend()
             if cleaner.leaf is None or not undoes(cleaner.leaf, opener):
                 continue
             for failing in parent.children[earlier + 1 : index]:
+                facts.spend()
                 if F in facts.statuses(failing) and not _cleaned_up(facts, parent, opener, failing):
                     yield hit(
                         cleaner,
@@ -110,14 +113,17 @@ def no_hysteresis(facts: Facts) -> Iterator[Hit]:
         if parent.type.name in (*REACTIVE, "WhileDoElse"):
             for index, child in enumerate(parent.children):
                 guard = through_decorators(child)
-                for later in parent.children[index + 1 :]:
-                    yield from _chattering(facts, guard, label(guard), of_guard(guard), later)
+                signals = of_guard(guard)
+                for later in parent.children[index + 1 :] if signals else ():
+                    yield from _chattering(facts, guard, label(guard), signals, later)
         elif parent.type.name == "Attributes" and isinstance(while_ := parent.parameters[WHILE], Script):
-            yield from _chattering(facts, parent, f'_while="{while_.text}"', of_script(while_), parent.children[0])
+            signals = of_script(while_)
+            if signals:
+                yield from _chattering(facts, parent, f'_while="{while_.text}"', signals, parent.children[0])
 
 
 def _chattering(facts: Facts, guard: Node, name: str, signals: tuple[str, ...], guarded: Node) -> Iterator[Hit]:
-    for action, leaf in facts.leaves(guarded) if signals else ():
+    for action, leaf in facts.leaves(guarded):
         moved = next((m for m in leaf.moves if any(overlap(signal, m) for signal in signals)), None)
         if moved is not None:
             yield hit(guard, f"{name} decides whether {label(action)} runs, which moves '{moved}': chattering")

@@ -32,6 +32,7 @@ def parallel_write(facts: Facts) -> Iterator[Hit]:
         for child in parent.children:
             mine = _writers(facts, child)
             for output, writer in mine.items():
+                facts.spend(len(before))
                 other = next((name for name in before if overlap(name, output)), None)
                 if other is not None:
                     first = before[other]
@@ -59,6 +60,7 @@ def parallel_masked(facts: Facts) -> Iterator[Hit]:
         for index, child in enumerate(parent.children):
             if facts.statuses(child) != {R}:
                 continue
+            facts.spend(len(parent.children))
             sets = [facts.statuses(other) for other in parent.children]
             sets[index] = frozenset((S, F, R))
             lost = (outcome(parent, sets).statuses - facts.statuses(parent)) & {S, F}

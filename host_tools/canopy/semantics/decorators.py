@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from differential.model.node import COMPLETED, Node, reached
-from differential.tree import FAILURE, RUNNING, SKIPPED, SUCCESS
+from canopy.semantics.node import COMPLETED, Node, reached
+from canopy.semantics.spec import FAILURE, RUNNING, SKIPPED, SUCCESS
 
 
 class Decorator(Node):

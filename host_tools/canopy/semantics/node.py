@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from differential.tree import COMPARISONS, ENTRIES, FAILURE, IDLE, RUNNING, SUCCESS, WAS, Script, Spec
+from canopy.semantics.spec import COMPARISONS, FAILURE, IDLE, RUNNING, SUCCESS, WAS, Script, Spec
 
 COMPLETED = (SUCCESS, FAILURE)
 TIME_MASK = (1 << 64) - 1
@@ -12,14 +12,18 @@ TIME_MASK = (1 << 64) - 1
 class World:
     """What the nodes of one running tree share: the time, the log of the leaves' calls, and the entries of scripts."""
 
-    def __init__(self) -> None:
+    def __init__(self, entries: int = 0) -> None:
         self.now = 0
         self.tick_number = 0
         self.calls: list[tuple[int, int]] = []
         self.faults = 0
         self.fault_node = 0xFFFF  # none yet
-        self.entries = [0] * len(ENTRIES)
-        self.updates = [0] * len(ENTRIES)
+        self.entries = [0] * entries
+        self.updates = [0] * entries
+
+    def answer(self, node: Node, _kind: int) -> int:
+        """What a leaf of the user's answers when it is called."""
+        return node.spec.answers[self.tick_number]
 
     def write(self, entry: int, value: int) -> None:
         self.entries[entry] = value

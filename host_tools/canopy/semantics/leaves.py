@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from differential.model.node import Node, reached
-from differential.tree import CONTINUE, FAILURE, HALTED, RUNNING, SKIPPED, START, SUCCESS
+from canopy.semantics.node import Node, reached
+from canopy.semantics.spec import CONTINUE, FAILURE, HALTED, RUNNING, SKIPPED, START, SUCCESS
 
 
 class UserLeaf(Node):
@@ -16,7 +16,7 @@ class UserLeaf(Node):
 
     def call(self, kind: int) -> int:
         self.world.calls.append((self.number, kind))
-        answer = self.spec.answers[self.world.tick_number]
+        answer = self.world.answer(self, kind)
         if answer in self.valid:
             return answer
         self.world.faults += 1  # rule 7

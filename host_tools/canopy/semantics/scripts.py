@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from differential.model.decorators import Decorator
-from differential.model.node import COMPLETED, Node
-from differential.tree import ATTRIBUTES, FAILURE, RUNNING, SKIPPED, SUCCESS
+from canopy.semantics.decorators import Decorator
+from canopy.semantics.node import COMPLETED, Node
+from canopy.semantics.spec import ATTRIBUTES, FAILURE, RUNNING, SKIPPED, SUCCESS
 
 
 class Script(Node):

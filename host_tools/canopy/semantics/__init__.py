@@ -2,14 +2,15 @@
 """The reference model of a tick: docs/semantics.md in its executable form, one class a node, plainly recursive.
 
 Slow and simple on purpose. A node's `tick_children` is its row of the table; what all nodes have in common (storing the
-status, halting exactly once, resetting) is said once, in Node.
+status, halting exactly once, resetting) is said once, in Node. The conformance table and random trees run through it
+and the engine (docs/differential.md); `canopy convert` and `canopy fmt --simplify` check their results in it.
 """
 
 from __future__ import annotations
 
 import itertools
 
-from differential.model.control import (
+from canopy.semantics.control import (
     AsyncFallback,
     AsyncSequence,
     Fallback,
@@ -27,7 +28,7 @@ from differential.model.control import (
     TryCatch,
     WhileDoElse,
 )
-from differential.model.decorators import (
+from canopy.semantics.decorators import (
     Counting,
     Decorator,
     Delay,
@@ -40,7 +41,7 @@ from differential.model.decorators import (
     RunOnce,
     Timeout,
 )
-from differential.model.leaves import (
+from canopy.semantics.leaves import (
     AlwaysFailure,
     AlwaysSuccess,
     Condition,
@@ -49,8 +50,8 @@ from differential.model.leaves import (
     SyncAction,
     UserLeaf,
 )
-from differential.model.node import COMPLETED, Node, World
-from differential.model.scripts import (
+from canopy.semantics.node import COMPLETED, Node, World
+from canopy.semantics.scripts import (
     Attributes,
     EntryUpdated,
     Loop,
@@ -63,7 +64,7 @@ from differential.model.scripts import (
     WaitValueUpdate,
     WasEntryUpdated,
 )
-from differential.tree import Outcome, Result, Spec, Tree
+from canopy.semantics.spec import Spec
 
 __all__ = [
     "COMPLETED",
@@ -86,7 +87,6 @@ __all__ = [
     "Inverter",
     "KeepRunningUntilFailure",
     "Loop",
-    "ModelTree",
     "Node",
     "Parallel",
     "ParallelAll",
@@ -116,7 +116,7 @@ __all__ = [
     "WasEntryUpdated",
     "WhileDoElse",
     "World",
-    "run_model",
+    "build",
 ]
 
 NODES: dict[str, type[Node]] = {
@@ -133,49 +133,16 @@ NODES: dict[str, type[Node]] = {
 }  # fmt: skip
 
 
-class ModelTree:
-    """A tree of the model. `nodes`: which class stands for which kind of node."""
+def build(root: Spec, world: World, nodes: dict[str, type[Node]] = NODES) -> list[Node]:
+    """The nodes of a tree, the root first, in the order of the file. `nodes`: the class of each kind of node."""
+    numbers = itertools.count()
+    made: list[Node] = []
 
-    def __init__(self, tree: Tree, world: World | None = None, nodes: dict[str, type[Node]] = NODES) -> None:
-        self.tree = tree
-        self.world = world or World()
-        self.nodes: list[Node] = []
-        self._classes = nodes
-        self._numbers = itertools.count()
-        self.root = self._build(tree.root)
-        self.nodes.sort(key=lambda node: node.number)
-
-    def _build(self, spec: Spec) -> Node:
-        number = next(self._numbers)
-        children = [self._build(child) for child in spec.children]
-        node = self._classes[spec.kind](self.world, number, spec, children)
-        self.nodes.append(node)
+    def make(spec: Spec) -> Node:
+        number = next(numbers)
+        node = nodes[spec.kind](world, number, spec, [make(child) for child in spec.children])
+        made.append(node)
         return node
 
-    def _outcome(self, status: int | None) -> Outcome:
-        calls, self.world.calls = self.world.calls, []
-        return Outcome(status, calls, bytes([node.code for node in self.nodes]), tuple(self.world.entries))
-
-    def tick(self, number: int) -> Outcome:
-        """Tick `number`, from 0. A tree that completed starts again with the next tick."""
-        self.world.tick_number = number
-        self.world.now = self.tree.times[number]
-        return self._outcome(self.root.tick())
-
-    def halt(self) -> Outcome:
-        """Halts the whole tree: every RUNNING node once, deepest first; every node is IDLE afterwards."""
-        self.root.reset()
-        for node in self.nodes:
-            node.reset()
-        return self._outcome(None)
-
-
-def run_model(tree: Tree, nodes: dict[str, type[Node]] = NODES) -> Result:
-    """Runs the model over all ticks of a tree."""
-    model = ModelTree(tree, nodes=nodes)
-    outcomes = []
-    for number in range(len(tree.times)):
-        outcomes.append(model.tick(number))
-        if tree.halt_after == number + 1:
-            outcomes.append(model.halt())
-    return Result(outcomes, model.world.faults, model.world.fault_node)
+    make(root)
+    return sorted(made, key=lambda node: node.number)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""`canopy verify`."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from canopy.certificate.check import check, decoded
+from canopy.certificate.formula import RejectedError
+from canopy.compiler.cli import read_type_options, type_options
+from canopy.compiler.errors import CompileError, Place
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo, echo_lines
+from canopy.files import FileError, read_bytes, write_files
+from canopy.verify.certify import certificate
+from canopy.verify.claims import Result
+from canopy.verify.model import Plant, number
+from canopy.verify.run import Subject, chosen, hand_over, load, model_path, recheck, verify
+from canopy.verify.solvers import SOLVERS
+
+SHOWN = 8
+UNEXPECTED = 1
+INPUT_ERROR = 2
+
+
+def _trace(plant: Plant, result: Result, whole: bool) -> list[str]:
+    lines = [f"{step:>6}  {plant.shown(visit.state)}  {visit.label}" for step, visit in enumerate(result.trace)]
+    if whole or len(lines) <= SHOWN + 1:
+        return lines
+    return [*lines[: SHOWN // 2], f"     …  {len(lines) - SHOWN} more (--trace shows all)", *lines[-SHOWN // 2 :]]
+
+
+def _print(plant: Plant, result: Result, checked: dict[str, str], whole: bool) -> None:
+    mark = "" if result.expected else f"   NOT AS EXPECTED ({result.claim.options.get('expect', 'proven')})"
+    echo(f"{result.verdict:8} {result.claim.name}{mark}")
+    solvers = "".join(f", {solver} {answer}" for solver, answer in checked.items() if answer)
+    echo(f"         {result.text} ({result.method}, {result.seconds:.2f} s{solvers})")
+    if result.trace and (whole or result.verdict == "refuted"):
+        for line in _trace(plant, result, whole):
+            echo(f"  {line}")
+
+
+def _as_json(subject: Subject, result: Result, checked: dict[str, str]) -> dict[str, Any]:
+    names = [variable.name for variable in subject.plant.variables]
+    return {
+        "claim": result.claim.name,
+        "kind": result.claim.kind,
+        "verdict": result.verdict,
+        "expected": result.expected,
+        "text": result.text,
+        "method": result.method,
+        "bound": None if result.bound is None else number(result.bound),
+        "seconds": round(result.seconds, 3),
+        "solvers": {solver: answer for solver, answer in checked.items() if answer},
+        "trace": [
+            {
+                "state": {name: number(value) for name, value in zip(names, visit.state, strict=True)},
+                "does": visit.label,
+                "status": visit.status,
+            }
+            for visit in result.trace
+        ],
+    }
+
+
+def _print_handover(subject: Subject) -> None:
+    found = hand_over(subject)
+    for one in found:
+        what = "FALLS BETWEEN: the tree fails" if one.falls else one.target
+        shown = subject.plant.shown
+        echo(f"hand-over {one.source} -> {what}: for example from {shown(one.before)} to {shown(one.after)}")
+    if not any(one.falls for one in found):
+        echo("hand-over: no step leads to where the tree fails")
+
+
+def _certify(folder: Path, subject: Subject, result: Result, tree: Path, timeout: float, *, quiet: bool) -> None:
+    """Writes the certificate of a claim, or says why there is none."""
+    try:
+        text = certificate(result.claim, tree, subject.plant.path, timeout)
+    except RejectedError as error:
+        line = f"no certificate: {error}"
+    else:
+        file = folder / f"claim-{result.claim.index + 1:02d}.certificate"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_files({file: text})
+        except FileError as error:
+            raise CompileError(Place(str(file)), error.problem) from error
+        except OSError as error:
+            raise CompileError(Place(str(file)), f"cannot be written: {error.strerror}") from error
+        line = f"certificate {file}, {len(text)} bytes"
+    if not quiet:
+        echo(f"         {line}")
+
+
+def _check(folder: Path, tree: Path, model: Path) -> int:
+    """Checks every certificate of a folder. Returns the exit status."""
+    files = sorted(folder.glob("*.certificate"))
+    if not files:
+        echo(f"{folder}: error: no certificates", err=True)
+        echo(f"  help: write them with --certificate {folder}", err=True)
+        return INPUT_ERROR
+    rejected = 0
+    for file in files:
+        try:
+            text = read_bytes(file)
+            shown = check(text, tree, model)
+            echo(f"accepted {file.name}: {decoded(text)['name']}: {shown}")
+        except (RejectedError, FileError, OSError) as error:
+            rejected += 1
+            echo(f"rejected {file.name}: {error}")
+    return UNEXPECTED if rejected else 0
+
+
+def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tuple[str, ...], stored: bool) -> None:
+    """Rejects options that do not go together."""
+    if (dbc is None) != (node is None):
+        raise click.UsageError("--dbc and --node go together")
+    if main_tree is not None and stored:
+        raise click.UsageError("certificates are about the file's main tree: leave --main-tree out")
+    for one in solver:
+        if importlib.util.find_spec(one) is None:
+            raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
+
+
+def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json_: bool) -> None:
+    """Ends with what the results say."""
+    if json_:
+        echo_lines(dumps([_as_json(subject, *one) for one in results], indent=1))
+    elif not results:
+        echo("the model is one of this tree; it claims nothing")
+    good = all(one.expected and "disagrees" not in checked.values() for one, checked in results)
+    sys.exit(0 if good else UNEXPECTED)
+
+
+@click.command()
+@click.argument("tree", metavar="TREE", type=click.Path(path_type=Path))
+@click.option("--model", type=click.Path(path_type=Path), help="The model. [default: NAME.plant.toml beside the tree]")
+@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: signals and units of the model are checked.")
+@click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
+@type_options
+@click.option("--claim", "names", multiple=True, metavar="NAME", help="Only this claim; may be given several times.")
+@click.option("--solver", multiple=True, type=click.Choice(SOLVERS), help="Have a solver check the proofs again.")
+@click.option(
+    "--timeout", default=60.0, show_default=True, type=click.FloatRange(0.1, 86_400), help="Seconds per claim."
+)
+@click.option("--certificate", "folder", type=click.Path(path_type=Path), help="Write certificates to this folder.")
+@click.option("--check", "checked_folder", type=click.Path(path_type=Path), help="Only check a folder's certificates.")
+@click.option("--handover", is_flag=True, help="Also print which leaf hands over to which.")
+@click.option("--trace", "whole", is_flag=True, help="Print every trace, and all of it.")
+@click.option("--json", "json_", is_flag=True, help="Print JSON.")
+def command(
+    tree: Path,
+    model: Path | None,
+    dbc: Path | None,
+    node: str | None,
+    include: str | None,
+    floats: bool,
+    unset_ports: bool,
+    type_map: tuple[str, ...],
+    packages: tuple[str, ...],
+    main_tree: str | None,
+    names: tuple[str, ...],
+    solver: tuple[str, ...],
+    timeout: float,
+    folder: Path | None,
+    checked_folder: Path | None,
+    handover: bool,
+    whole: bool,
+    json_: bool,
+) -> None:
+    """Decide what a model of its leaves makes of TREE: time bounds, safety, margins, chattering (docs/verify.md).
+
+    The model says for each leaf where it returns what, and what it does to the plant's state. Each claim in it is
+    proven, refuted with a state and the steps from there, or unknown. All arithmetic is exact.
+
+    A certificate has the numbers that show a claim of the kinds reaches and avoids. --check judges them again with a
+    small program that has no solver, and that reads tree and model by itself.
+
+    Exit status: 0 all came out as the model file expects, 1 one did not, a solver disagrees, or a certificate is
+    rejected, 2 wrong input.
+
+    \b
+    Examples:
+      canopy verify examples/nao/trees/get_home.xml
+      canopy verify examples/nao/trees/power_supply.xml --dbc examples/nao/nao.dbc --node Controller
+      canopy verify examples/nao/trees/get_home.xml --solver z3 --solver cvc5 --json
+      canopy verify examples/nao/trees/get_home.xml --certificate proofs
+      canopy verify examples/nao/trees/get_home.xml --check proofs
+    """
+    _usage(dbc, node, main_tree, solver, folder is not None or checked_folder is not None)
+    results = []
+    if checked_folder is not None:
+        sys.exit(_check(checked_folder, tree, model or model_path(tree)))
+    try:
+        options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
+        subject = load(tree, model or model_path(tree), dbc, node or "", options)
+        for claim in chosen(subject, names):
+            result = verify(subject, claim, timeout)
+            checked = {one: recheck(result, one) for one in solver}
+            results.append((result, checked))
+            if not json_:
+                _print(subject.plant, result, checked, whole)
+            if folder is not None and result.verdict == "proven":
+                _certify(folder, subject, result, tree, timeout, quiet=json_)
+        if handover and not json_:
+            _print_handover(subject)
+    except CompileError as error:
+        echo_lines(str(error), err=True)
+        sys.exit(INPUT_ERROR)
+    _finish(subject, results, json_)
