@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-import re
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,23 @@ import cantools
 import cantools.database.can
 from cantools.database.errors import Error as DatabaseError
 
+from canopy.compiler.bounds import Limits, whole
+from canopy.compiler.dbc_text import DbcText
 from canopy.compiler.errors import CompileError, Place, nearest
 
 MAX_BYTES = 16 * 1024 * 1024
-MAX_MESSAGE_BYTES = 1785  # of J1939's transport protocol
-_MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:\s*(\d+)")
 
 
-def load_dbc(path: Path) -> Any:
-    """The database of a DBC file, in cantools' strict mode.
+@dataclass(frozen=True)
+class Dbc:
+    """A DBC as cantools reads it, and its text, which knows the lines."""
+
+    database: Any
+    text: DbcText
+
+
+def load_dbc(path: Path) -> Dbc:
+    """A DBC file, in cantools' strict mode.
 
     Raises:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
@@ -30,35 +38,25 @@ def load_dbc(path: Path) -> Any:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise CompileError(place, f"the file has {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
-        _check_lengths(path)
+        text = DbcText(str(path), path.read_text(encoding="cp1252", errors="replace"))
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
         database = cantools.database.load_file(str(path), database_format="dbc", strict=True)
     except OSError as error:
         raise CompileError(place, f"cannot be read: {error.strerror}") from error
-    except (DatabaseError, ValueError, KeyError, ArithmeticError) as error:
+    except (DatabaseError, ValueError, LookupError, ArithmeticError, TypeError, AttributeError) as error:
+        # The last four are what cantools does not catch itself: an attribute's type that is none, an index of an enum.
         raise CompileError(place, f"not a DBC that can be read: {error}") from error
     if not isinstance(database, cantools.database.can.Database):
         raise CompileError(place, "not a CAN database")
-    _check_unique(place, database)
-    return database
+    _check_unique(text, database)
+    return Dbc(database, text)
 
 
-def _check_lengths(path: Path) -> None:
-    """Refuses messages longer than any protocol's: cantools takes memory and time for each bit of them."""
-    for line_number, line in enumerate(path.read_text(encoding="cp1252", errors="replace").splitlines(), 1):
-        found = _MESSAGE_LENGTH.match(line)
-        if found is not None and (len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES):
-            raise CompileError(
-                Place(str(path), line_number),
-                f"message '{found[1]}' is longer than {MAX_MESSAGE_BYTES} bytes",
-                "CAN FD has 64",
-            )
-
-
-def _check_unique(place: Place, database: Any) -> None:
+def _check_unique(text: DbcText, database: Any) -> None:
     names: set[str] = set()
     identifiers: dict[tuple[int, bool], str] = {}
     for message in database.messages:
+        place = text.message(message)
         if message.name in names:
             raise CompileError(place, f"there are two messages '{message.name}'")
         names.add(message.name)
@@ -85,21 +83,32 @@ def _given(database: Any, owner: Any, name: str) -> Any:
     return definition.default_value if definition is not None else None
 
 
-def number(database: Any, place: Place, owner: Any, name: str) -> Decimal | None:
-    """An attribute that is a number."""
-    value = _given(database, owner, name)
+def _owner(message: Any, signal: Any) -> str:
+    return f"message '{message.name}'" if signal is None else f"signal '{message.name}.{signal.name}'"
+
+
+def number(dbc: Dbc, name: str, message: Any, signal: Any = None) -> Decimal | None:
+    """An attribute of a message, or of one of its signals, that is a number."""
+    value = _given(dbc.database, message if signal is None else signal, name)
     try:
-        return None if value is None or value == "" else Decimal(str(value))
+        result = None if value is None or value == "" else Decimal(str(value))
     except InvalidOperation:
-        raise CompileError(place, f"attribute {name} of '{owner.name}' is {value!r}, and must be a number") from None
+        result = Decimal("nan")
+    if result is not None and not result.is_finite():
+        raise CompileError(
+            dbc.text.attribute(name, message, signal),
+            f"attribute {name} of {_owner(message, signal)} is {value!r}, and must be a number",
+        )
+    return result
 
 
-def attribute(database: Any, place: Place, owner: Any, name: str, default: int) -> int:
-    """An attribute that is a whole number."""
-    value = number(database, place, owner, name)
-    return default if value is None else int(value)
+def attribute(dbc: Dbc, name: str, limits: Limits, message: Any, signal: Any = None) -> int | None:
+    """An attribute that is a whole number, within limits.
 
-
-def dbc_id(message: Any) -> int:
-    """The id as the DBC writes it."""
-    return int(message.frame_id | (0x80000000 if message.is_extended_frame else 0))
+    Raises:
+        CompileError: it is not; with the line of the attribute.
+    """
+    value = number(dbc, name, message, signal)
+    if value is None:
+        return None
+    return whole(value, limits, f"{name} of {_owner(message, signal)}", dbc.text.attribute(name, message, signal))
