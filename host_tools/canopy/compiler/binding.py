@@ -17,6 +17,7 @@ from canopy.compiler.script.syntax import Assignment, Expression, Name, Number, 
 from canopy.compiler.script.values import Const, Double, Num, TextConst, Value
 from canopy.compiler.script_bodies import Bodies, entry_value
 from canopy.compiler.tree import Bound, Node, Script, Tree
+from canopy.escape.c import mark_c
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class BoundPort:
     constant: str
     copy: str | None = None
     updates: str | None = None
+
+
+def _bound_port(constant: str, copy: str | None = None, updates: str | None = None) -> BoundPort:
+    """A BoundPort of C that was made here."""
+    return BoundPort(*mark_c((constant, copy, updates)))
 
 
 @dataclass
@@ -82,7 +88,7 @@ class _Binder:
         bodies = Bodies(self._bus, self._texts, self._floats, {id(node): i for i, node in enumerate(self._nodes)})
         for script in self._tree.scripts:
             try:
-                script.body = bodies.body(script, self._parsed.get(id(script), ()))
+                script.body = mark_c(bodies.body(script, self._parsed.get(id(script), ())))
             except ScriptError as error:
                 raise script_error(script, error) from error
         for node in self._nodes:
@@ -293,8 +299,8 @@ class _Binder:
         if isinstance(bound.target, SignalName):
             return self._signal(bound, bound.target, where)
         if bound.text is None:  # nothing is connected
-            return BoundPort("NULL" if port.writes or port.type.kind == "user" else _zero(port.type))
-        return BoundPort(_constant(bound.text, port.type, where, bound.place))
+            return _bound_port("NULL" if port.writes or port.type.kind == "user" else _zero(port.type))
+        return _bound_port(_constant(bound.text, port.type, where, bound.place))
 
     def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
         kind = bound.port.type
@@ -306,12 +312,12 @@ class _Binder:
             c = compiler.storing.convert(value, kind, 0)
         except ScriptError as error:
             raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
-        return BoundPort(_zero(kind), stripped(c))
+        return _bound_port(_zero(kind), stripped(c))
 
     def _connected(self, leaf: Leaf, bound: Bound, entry: Entry, where: str, bindings: Bindings) -> BoundPort:
         port = bound.port
         if entry.is_constant:
-            return BoundPort(_constant(entry.initial or "", port.type, where, entry.place))
+            return _bound_port(_constant(entry.initial or "", port.type, where, entry.place))
         if entry.type != port.type:
             first = next((use for use in entry.uses if use.type == entry.type), entry.uses[0])
             raise CompileError(
@@ -323,14 +329,14 @@ class _Binder:
             if entry.counted:
                 bindings.counted_ports.add((leaf.id, port.name))
             updates = f"&memory.entries.{entry.c_name}_updates" if entry.counted else None
-            return BoundPort(f"&memory.entries.{entry.c_name}", updates=updates)
+            return _bound_port(f"&memory.entries.{entry.c_name}", updates=updates)
         if port.type.kind == "user":
-            return BoundPort(f"&memory.entries.{entry.c_name}")
+            return _bound_port(f"&memory.entries.{entry.c_name}")
         if port.type.kind == "text":
             place, texts = f"app->entries.{entry.c_name}", f"{self._name}_texts"
             # A leaf may have written any number.
-            return BoundPort("NULL", f"{texts}[{place} < {texts.upper()} ? {place} : 0u]")
-        return BoundPort(_zero(port.type), f"app->entries.{entry.c_name}")
+            return _bound_port("NULL", f"{texts}[{place} < {texts.upper()} ? {place} : 0u]")
+        return _bound_port(_zero(port.type), f"app->entries.{entry.c_name}")
 
 
 def _literal_kind(text: str) -> PortType:

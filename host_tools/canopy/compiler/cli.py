@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,38 +11,36 @@ from typing import TypeVar
 import click
 
 from canopy.compiler.budget import Budget
-from canopy.compiler.emit import load_application, render, write_files
+from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, MAX_NODES, MAX_USES
 from canopy.compiler.names import is_c_identifier
+from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options, is_fixed_point
-from canopy.compiler.stubs import stubs, write_stubs
-
-INPUT_ERROR = 2
+from canopy.compiler.stubs import stubs
+from canopy.escape import c
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo
 
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
 
 def _print_costs(budget: Budget) -> None:
     width = max(len(cost.kind) for cost in budget.kinds)
-    click.echo(f"  {'kind of node':{max(width, 12)}}  nodes  RAM each  flash each")
+    echo(f"  {'kind of node':{max(width, 12)}}  nodes  RAM each  flash each")
     for cost in budget.kinds:
-        click.echo(f"  {cost.kind:{max(width, 12)}} {cost.nodes:6d} {cost.ram_each:9d} {cost.flash_each:11d}")
+        echo(f"  {cost.kind:{max(width, 12)}} {cost.nodes:6d} {cost.ram_each:9d} {cost.flash_each:11d}")
 
 
 def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int | None) -> None:
     def limit(value: int | None) -> str:
         return f" of {value}" if value is not None else ""
 
-    click.echo(f"{name}: {budget.nodes} nodes, depth {budget.max_depth}")
-    click.echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
-    click.echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
-    click.echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
-    click.echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
-
-
-def _not_written(error: OSError, output: Path) -> CompileError:
-    return CompileError(Place(str(error.filename or output)), f"cannot be written: {error.strerror}")
+    echo(f"{name}: {budget.nodes} nodes, depth {budget.max_depth}")
+    echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
+    echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
+    echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
+    echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
 
 
 package_option = click.option(
@@ -113,6 +110,11 @@ def read_type_options(
         if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
+    if include is not None:
+        try:
+            c.header(include)
+        except ValueError as error:
+            raise CompileError(Place("--include"), str(error)) from error
     return Options(floats, result, include, read_packages(packages), unset_ports, main_tree)
 
 
@@ -177,31 +179,20 @@ def command(
         images = _images(image_nodes, image_uses)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)
+        first = {} if stubs_file is None else {stubs_file: stubs(application.name, application.table, application.bus).encode()}
+        if depfile is not None:
+            read = [*application.table.tree.files, dbc]
+            first |= dependencies(depfile, output / f"{application.name}_app.c", read)
     except CompileError as error:
-        click.echo(str(error), err=True)
-        sys.exit(INPUT_ERROR)
+        fail(error)
     budget = application.budget
     for what, used, most in (("RAM", budget.ram_bytes, max_ram), ("flash", budget.flash_bytes, max_flash)):
         if most is not None and used > most:
-            click.echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
+            echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
-    made: list[Path] = []  # goes again when not all can be written
-    try:
-        if stubs_file is not None:
-            write_stubs(stubs_file, stubs(application.name, application.table, application.bus))
-            made.append(stubs_file)
-        write_files(output, files)
-        made += [output / file for file in files]
-        if depfile is not None:
-            read = [str(file.resolve()) for file in (*application.table.tree.files, dbc)]
-            depfile.write_text(f"{output / application.name}_app.c: {' '.join(read)}\n".replace("\\", "/"))
-    except (CompileError, OSError) as error:
-        for path in made:
-            path.unlink(missing_ok=True)
-        click.echo(str(error if isinstance(error, CompileError) else _not_written(error, output)), err=True)
-        sys.exit(INPUT_ERROR)
+    write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
     if as_json:
-        click.echo(json.dumps(budget.as_dict()))
+        echo(dumps(budget.as_dict()))
     else:
         _print_budget(application.name, budget, max_ram, max_flash)
         if costs:

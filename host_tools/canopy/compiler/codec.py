@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from canopy.compiler.bus_model import INTEGER_LIMITS, Bus, Message, Ranges, Signal, float_value
+from canopy.escape.c import emits_c
 
 
 @dataclass(frozen=True)
@@ -55,11 +56,13 @@ def segments(signal: Signal) -> tuple[Segment, ...]:
     return tuple(result)
 
 
+@emits_c
 def carrier(signal: Signal) -> str:
     """The unsigned C type in which the signal's raw bits are put together."""
     return "uint32_t" if signal.length <= 32 else "uint64_t"
 
 
+@emits_c
 def value_type(signal: Signal) -> str:
     """The C type in which a raw value is computed with and handed to a setter: it holds the whole raw range."""
     if signal.is_bool:
@@ -72,6 +75,7 @@ def value_type(signal: Signal) -> str:
     return "int64_t" if high < 2**63 else "uint64_t"
 
 
+@emits_c
 def number(value: int, c_type: str) -> str:
     """A C literal of that type."""
     macro = c_type.removesuffix("_t").upper() + "_C"
@@ -80,6 +84,7 @@ def number(value: int, c_type: str) -> str:
     return f"{macro}({value})"
 
 
+@emits_c
 def literal(signal: Signal, value: int) -> str:
     """C: a raw value of the signal, as its member holds it."""
     if signal.is_bool:
@@ -90,11 +95,13 @@ def literal(signal: Signal, value: int) -> str:
     return str(value) if abs(value) < 2**15 else number(value, value_type(signal))
 
 
+@emits_c
 def local_type(signal: Signal) -> str:
     """The C type of the local variable that holds the signal in a codec: floats are there as bits."""
     return carrier(signal) if signal.is_float else value_type(signal)
 
 
+@emits_c
 def sent_type(signal: Signal) -> str:
     """The C type of the local variable from which the signal is encoded: it holds all that the member can hold."""
     if signal.is_float:
@@ -102,6 +109,7 @@ def sent_type(signal: Signal) -> str:
     return signal.c_type if signal.c_type in ("bool", "uint32_t", "int64_t", "uint64_t") else "int32_t"
 
 
+@emits_c
 def decode_expression(signal: Signal) -> str:
     """C: the signal's raw value out of `data`, as local_type(signal)."""
     unsigned = carrier(signal)
@@ -125,6 +133,7 @@ def decode_expression(signal: Signal) -> str:
     return f"({kind})({raw})"
 
 
+@emits_c
 def encode_lines(signals: tuple[Signal, ...], length: int) -> tuple[tuple[int, str], ...]:
     """C: (byte, value to put there) for each byte that the signals have bits in, from variables of their names."""
     terms: list[list[str]] = [[] for _ in range(length)]
@@ -137,6 +146,7 @@ def encode_lines(signals: tuple[Signal, ...], length: int) -> tuple[tuple[int, s
     return tuple((place, " | ".join(byte)) for place, byte in enumerate(terms) if byte)
 
 
+@emits_c
 def bare(expression: str) -> str:
     """Without the parentheses around the whole of it."""
     if not expression.startswith("("):
@@ -188,6 +198,7 @@ def _float_test(signal: Signal, name: str) -> str:
     return f"!canopy_float{signal.length}_within({name}, {_float_ends(signal)})"
 
 
+@emits_c
 def refuse_test(signal: Signal) -> str:
     """C: is the decoded value one that the DBC does not allow? Empty when every value of the bits is allowed."""
     if signal.is_bool:
@@ -197,11 +208,13 @@ def refuse_test(signal: Signal) -> str:
     return _outside(signal.c_name, signal.accepted, value_type(signal), signal.limits)
 
 
+@emits_c
 def refuse_tests(branch: Branch) -> tuple[str, ...]:
     """C: those of refuse_test() that the branch's signals have."""
     return tuple(test for test in map(refuse_test, branch.signals) if test)
 
 
+@emits_c
 def limit_test(signal: Signal, name: str, kind: str, holder: str) -> str:
     """C: must the variable `name` of C type `kind`, filled from one of type `holder`, not be sent as it is?
 
@@ -214,6 +227,7 @@ def limit_test(signal: Signal, name: str, kind: str, holder: str) -> str:
     return _outside(name, signal.sendable, kind, INTEGER_LIMITS[holder])
 
 
+@emits_c
 def replacement(signal: Signal, name: str, kind: str, holder: str) -> str:
     """C: what is sent in the place of a variable that may not be sent as it is: the nearest end, or the safe value."""
     if signal.is_float:
@@ -230,6 +244,7 @@ def replacement(signal: Signal, name: str, kind: str, holder: str) -> str:
     return f"{name} < {low} ? {low} : {high}"
 
 
+@emits_c
 def condition(signal: Signal, message: Message, *, sending: bool = False) -> str:
     """C: is the multiplexed signal in the frame? From variables named as the multiplexers; "" when it always is."""
     kinds = {s.c_name: sent_type(s) if sending else value_type(s) for s in message.signals}
@@ -254,6 +269,7 @@ def branches(message: Message, *, sending: bool = False) -> tuple[Branch, ...]:
     return tuple(Branch(test, tuple(signals)) for test, signals in groups.items())
 
 
+@emits_c
 def physical_macro(signal: Signal) -> str:
     """C: the body of the macro that makes a raw value of the constant `physical`."""
     scale, offset = (
@@ -269,6 +285,7 @@ def may_limit(message: Message) -> bool:
     return any(limit_test(signal, signal.c_name, sent_type(signal), signal.c_type) for signal in message.signals)
 
 
+@emits_c
 def parameter_type(bus: Bus, message: Message, signal: Signal) -> str:
     """The C type in which a setter takes the value."""
     return f"{bus.name}_{message.c_name}_{signal.c_name}_t" if signal.is_enum else value_type(signal)

@@ -10,15 +10,18 @@ import click
 
 from canopy.compiler.bus_model import Bus
 from canopy.compiler.bus_reader import read_bus, read_messages
-from canopy.compiler.emit import environment, render_bus, write_files
+from canopy.compiler.emit import environment, render_bus
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.generation import tie
 from canopy.compiler.layout import layout
+from canopy.compiler.output import write_or_exit
+from canopy.escape.terminal import echo, echo_lines
 
 INPUT_ERROR = 2
 
 
 def render_codec(bus: Bus) -> dict[str, str]:
-    """The codec's two files: file name -> content. The same input gives the same bytes."""
+    """The codec's two files: file name -> content, for tie(). The same input gives the same bytes."""
     templates = environment(bus)
     return {
         f"{bus.name}_codec.{suffix}": layout(templates.get_template(f"codec.{suffix}.j2").render(bus=bus))
@@ -59,12 +62,8 @@ def command(dbc: Path, output: Path, node: str, messages: tuple[str, ...], perio
         if not bus.messages:
             raise CompileError(Place(str(dbc)), "no message to make a codec of", "leave out --node or --message")
     except CompileError as error:
-        click.echo(str(error), err=True)
+        echo_lines(str(error), err=True)
         sys.exit(INPUT_ERROR)
-    try:
-        write_files(output, files)
-    except OSError as error:
-        click.echo(f"{output}: error: cannot be written: {error.strerror}", err=True)
-        sys.exit(INPUT_ERROR)
+    write_or_exit(output, tie(files))
     signals = sum(len(message.signals) for message in bus.messages)
-    click.echo(f"{bus.name}: {len(bus.messages)} messages, {signals} signals: {', '.join(sorted(files))}")
+    echo(f"{bus.name}: {len(bus.messages)} messages, {signals} signals: {', '.join(sorted(files))}")

@@ -16,6 +16,7 @@ from cantools.database.errors import Error as DatabaseError
 from canopy.compiler.bounds import Limits, whole
 from canopy.compiler.dbc_text import DbcText
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.files import FileError, read_bytes
 
 MAX_BYTES = 16 * 1024 * 1024
 
@@ -28,6 +29,40 @@ class Dbc:
     text: DbcText
 
 
+def decode_dbc(data: bytes) -> str:
+    """The text of a DBC: in UTF-8 if it is that, else in Windows-1252, in which most tools write DBCs.
+
+    Raises:
+        UnicodeDecodeError: a byte stands for no character in either.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_dbc(path: Path) -> bytes:
+    """The bytes of a DBC file.
+
+    Raises:
+        CompileError: it cannot be read, or has a byte that stands for no character.
+    """
+    try:
+        data = read_bytes(path, MAX_BYTES)
+        decode_dbc(data)
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem) from error
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise CompileError(
+            Place(str(path), line),
+            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
+            "save the file as UTF-8",
+        ) from None
+    return data
+
+
 def load_dbc(path: Path) -> Dbc:
     """A DBC file, in cantools' strict mode.
 
@@ -35,14 +70,11 @@ def load_dbc(path: Path) -> Dbc:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
     """
     place = Place(str(path))
+    content = decode_dbc(read_dbc(path))
+    text = DbcText(str(path), content)
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise CompileError(place, f"the file has {path.stat().st_size} bytes; at most {MAX_BYTES} are read")
-        text = DbcText(str(path), path.read_text(encoding="cp1252", errors="replace"))
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
-        database = cantools.database.load_file(str(path), database_format="dbc", strict=True)
-    except OSError as error:
-        raise CompileError(place, f"cannot be read: {error.strerror}") from error
+        database = cantools.database.load_string(content, database_format="dbc", strict=True)
     except (DatabaseError, ValueError, LookupError, ArithmeticError, TypeError, AttributeError) as error:
         # The last four are what cantools does not catch itself: an attribute's type that is none, an index of an enum.
         raise CompileError(place, f"not a DBC that can be read: {error}") from error

@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import functools
-import json
+import hashlib
 import os
 import re
-import tempfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +17,9 @@ from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
+from canopy.compiler.dbc_file import read_dbc
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.generation import PLACEHOLDER, tie
 from canopy.compiler.image_catalogue import Catalogue
 from canopy.compiler.image_room import exchangeable, image_cost, make_room
 from canopy.compiler.layout import layout
@@ -32,17 +32,20 @@ from canopy.compiler.leaf_c import (
     parameters,
     port_members,
     prototypes,
-    setters,
+    setter,
     stale_test,
     text_constants,
 )
 from canopy.compiler.names import is_c_identifier, snake
-from canopy.compiler.port_types import Options, PortType, c_string
+from canopy.compiler.port_types import Options, PortType
 from canopy.compiler.row_c import place_constant, row_fields
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
 from canopy.compiler.tree_reader import read_tree
+from canopy.escape import c_templates
+from canopy.escape.c import header, string
+from canopy.escape.json_text import dumps
 
 MODEL_FORMAT = 1
 
@@ -171,6 +174,7 @@ def model(application: Application) -> dict[str, object]:
         },
         "bus": {
             "dbc": bus.path.name,
+            "dbc_hash": hashlib.sha256(read_dbc(bus.path)).hexdigest()[:16],
             "node": bus.node,
             "receive": [message.name for message in bus.receive],
             "send": [message.name for message in bus.send],
@@ -179,11 +183,6 @@ def model(application: Application) -> dict[str, object]:
         "budget": application.budget.as_dict(),
         **({"image": application.images.model(application.options)} if application.images is not None else {}),
     }
-
-
-def _comment(text: str) -> str:
-    """Text that may stand inside a C comment."""
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
 
 
 def _queues(table: Table) -> list[PortType]:
@@ -210,14 +209,8 @@ def _exact(place: Place) -> str:
 
 def environment(bus: Bus) -> jinja2.Environment:
     """The templates, with what they call."""
-    result = jinja2.Environment(
-        loader=jinja2.PackageLoader("canopy.compiler"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    result.filters |= {"snake": snake, "comment": _comment, "short": _short, "exact": _exact, "c_string": c_string}
+    result = c_templates.environment("canopy.compiler")
+    result.filters |= {"snake": snake, "short": _short, "exact": _exact, "c_string": string, "c_header": header}
     result.filters["identifier"] = _identifier
     result.globals |= {
         "codec": codec,
@@ -227,7 +220,7 @@ def environment(bus: Bus) -> jinja2.Environment:
         "prototypes_of": prototypes,
         "function_names_of": function_names,
         "port_members": port_members,
-        "setters": setters,
+        "setter": setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
         "item_type": item_type,
@@ -236,12 +229,13 @@ def environment(bus: Bus) -> jinja2.Environment:
         "row_fields": row_fields,
         "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
+        "generation": PLACEHOLDER,
     }
     return result
 
 
 def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
-    """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content."""
+    """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content, for tie()."""
     templates = environment(bus)
     return {
         f"{bus.name}_bus.{suffix}": layout(
@@ -251,8 +245,8 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
     }
 
 
-def render(application: Application) -> dict[str, str]:
-    """File name -> content. The same input gives the same bytes."""
+def render(application: Application) -> dict[str, bytes]:
+    """File name -> content, the one that a build looks at last. The same input gives the same bytes."""
     bindings = application.table.bindings
     texts = Texts()
     texts.all = list(bindings.texts) or [""]
@@ -278,27 +272,8 @@ def render(application: Application) -> dict[str, str]:
         file: layout(environment(application.bus).get_template(template).render(context))
         for file, template in templates.items()
     }
-    files[f"{name}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
-    files[application.bus.path.name] = application.bus.path.read_text(encoding="cp1252")
-    return files
-
-
-def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
-    """Writes all files, texts and bytes, each one whole or not at all.
-
-    Raises:
-        OSError: the folder cannot be made or written.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, content in files.items():
-        if isinstance(content, str):
-            content = content.encode("cp1252" if name.endswith(".dbc") else "utf-8")
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, folder / name)
-        except BaseException:
-            os.unlink(temporary)
-            raise
+    return {
+        application.bus.path.name: read_dbc(application.bus.path),
+        f"{name}.model.json": (dumps(model(application), indent=1) + "\n").encode(),
+        **tie(files),
+    }

@@ -7,6 +7,8 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from canopy.escape.visible import brief
+
 
 @dataclass(frozen=True)
 class Place:
@@ -32,8 +34,8 @@ class CompileError(Exception):
         self.help_text = help_text
 
     def __str__(self) -> str:
-        text = f"{self.place}: error: {self.message}"
-        return f"{text}\n  help: {self.help_text}" if self.help_text else text
+        text = f"{brief(str(self.place))}: error: {brief(self.message)}"
+        return f"{text}\n  help: {brief(self.help_text)}" if self.help_text else text
 
 
 class UnsupportedTypeError(CompileError):

@@ -19,6 +19,7 @@ from canopy.compiler.leaf_model import Port
 from canopy.compiler.numbers import exact
 from canopy.compiler.table import Row, Table
 from canopy.compiler.tree import Bound, Node
+from canopy.files import read_bytes
 
 MAGIC = b"CNPY"
 VERSION = 1
@@ -131,7 +132,7 @@ class _Writer:
                 raise self._error(
                     use.nodes[0].place,
                     f"'{leaf.id}' is declared differently there",
-                    f"there: {known['signature']}\n        here: {leaf_signature(leaf)}",
+                    f"there: {known['signature']}; here: {leaf_signature(leaf)}",
                 )
         names = [entry["name"] for entry in self._firmware["entries"]]
         for entry in self._table.bindings.entries:
@@ -251,9 +252,9 @@ def read_image(path: Path) -> Image:
 
     Raises:
         ImageError: it is no image, or of another format version, or not as long as it says.
-        OSError: the file cannot be read.
+        FileError: the file cannot be read.
     """
-    data = path.read_bytes()
+    data = read_bytes(path)
     if len(data) < HEADER.size or data[:4] != MAGIC:
         raise ImageError("is no tree image")
     fields = HEADER.unpack_from(data)

@@ -10,13 +10,17 @@ from typing import Any
 
 import click
 
-from canopy.compiler.emit import MODEL_FORMAT, Application, load_application, model, write_files
+from canopy.compiler.dbc_file import read_dbc
+from canopy.compiler.emit import MODEL_FORMAT, Application, load_application, model
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
 from canopy.compiler.node_types import node_types
+from canopy.compiler.output import dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo, echo_lines
+from canopy.files import FileError, read_text
 
-INPUT_ERROR = 2
 BITRATE = 500_000  # of no account for an image
 # What is read of a model file.
 FIELDS: dict[str, type] = {
@@ -33,17 +37,12 @@ FIELDS: dict[str, type] = {
 }
 
 
-def _fail(text: str) -> None:
-    click.echo(text, err=True)
-    sys.exit(INPUT_ERROR)
-
-
 def _read_model(path: Path) -> dict[str, Any]:
     """The firmware's model file. canopy.model reads it for tools that watch, and wants a trace."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CompileError(Place(str(path)), f"cannot be read: {error.strerror}", "the build writes it") from error
+        data = json.loads(read_text(path))
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem, "the build writes it") from error
     except (ValueError, RecursionError) as error:
         raise CompileError(Place(str(path)), f"is no JSON: {error}") from error
     if not isinstance(data, dict) or data.get("format") != MODEL_FORMAT:
@@ -106,21 +105,17 @@ def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: P
     """
     try:
         application, image = _compile(tree, firmware)
-        files: dict[str, str | bytes] = {output.name: image}
+        dbc = application.bus.path
+        files: dict[str, bytes] = {}
         if with_model:
-            dbc = application.bus.path
-            files[f"{output.stem}.model.json"] = json.dumps(model(application), indent=1, ensure_ascii=False) + "\n"
-            files[dbc.name] = dbc.read_text(encoding="cp1252")
-        write_files(output.parent, files)
-        if depfile is not None:
-            read = [str(file.resolve()) for file in (*application.table.tree.files, firmware, application.bus.path)]
-            depfile.write_text(f"{output}: {' '.join(read)}\n".replace("\\", "/"))
+            files[dbc.name] = read_dbc(dbc)
+            files[f"{output.stem}.model.json"] = (dumps(model(application), indent=1) + "\n").encode()
+        read = [*application.table.tree.files, firmware, dbc]
+        first = dependencies(depfile, output, read) if depfile is not None else {}
     except CompileError as error:
-        _fail(str(error))
-    except OSError as error:
-        _fail(f"{output}: error: cannot be written: {error.strerror}")
-    else:
-        click.echo(f"{output}: {len(image)} bytes, {len(application.table.rows)} nodes, hash {application.table.hash}")
+        fail(error)
+    write_or_exit(output.parent, {**files, output.name: image}, first)
+    echo(f"{output}: {len(image)} bytes, {len(application.table.rows)} nodes, hash {application.table.hash}")
 
 
 def _as_dict(image: Image) -> dict[str, Any]:
@@ -161,17 +156,17 @@ def show(image_file: Path, as_json: bool) -> None:
     """Print what an image says of itself. Exit status: 0, 1 its CRC is wrong, 2 it is no image."""
     try:
         image = read_image(image_file)
-    except ImageError as error:
-        _fail(f"{image_file}: error: {error}")
-    except OSError as error:
-        _fail(f"{image_file}: error: cannot be read: {error.strerror}")
+    except (ImageError, FileError) as error:
+        problem = error.problem if isinstance(error, FileError) else str(error)
+        fail(CompileError(Place(str(image_file)), problem))
     else:
         if as_json:
-            click.echo(json.dumps(_as_dict(image), indent=1))
+            echo_lines(dumps(_as_dict(image), indent=1))
         else:
-            click.echo(f"{image_file}: {image.size} bytes, hash {image.hash:016x}, engine {image.engine:016x}")
-            click.echo(f"  CRC      {image.crc:08x} {'right' if image.crc_is_right else 'WRONG'}")
+            echo(f"{image_file}: {image.size} bytes, hash {image.hash:016x}, engine {image.engine:016x}")
+            echo(f"  CRC      {image.crc:08x} {'right' if image.crc_is_right else 'WRONG'}")
             for what in ("nodes", "parameters", "kinds", "scripts", "entries", "uses", "values"):
-                click.echo(f"  {what:10s}{len(getattr(image, what)):6d}")
-            click.echo(f"  words     {image.words:6d}\n  texts     {len(image.texts):6d} bytes")
+                echo(f"  {what:10s}{len(getattr(image, what)):6d}")
+            echo(f"  words     {image.words:6d}")
+            echo(f"  texts     {len(image.texts):6d} bytes")
         sys.exit(0 if image.crc_is_right else 1)

@@ -11,10 +11,12 @@ from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.names import snake
 from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType
+from canopy.escape.c import emits_c
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
 
 
+@emits_c
 def stale_test(bus: Bus, leaf: Leaf) -> str:
     """C: is something that the leaf reads not known? A multiplexed signal that it names must have come, too."""
     flags = {(m.name, s.name): s.has_name for m in bus.receive for s in m.multiplexed}
@@ -28,6 +30,7 @@ def stale_test(bus: Bus, leaf: Leaf) -> str:
     return " || ".join(f"!app->input.{message}.{flag}" for message, flag in reads)
 
 
+@emits_c
 def parameters(leaf: Leaf, bus: Bus, before: str = "") -> str:
     """The parameters of the user's functions; `before` stands in front."""
     parts = [before] if before else []
@@ -41,6 +44,7 @@ def parameters(leaf: Leaf, bus: Bus, before: str = "") -> str:
     return ", ".join(parts)
 
 
+@emits_c
 def arguments(leaf: Leaf, *, copies: bool = False, before: str = "") -> str:
     """The arguments for these parameters, in a function of the generated code that has `app` and `parameter`."""
     parts = [before] if before else []
@@ -54,6 +58,7 @@ def arguments(leaf: Leaf, *, copies: bool = False, before: str = "") -> str:
     return ", ".join(parts)
 
 
+@emits_c
 def prototypes(leaf: Leaf, bus: Bus) -> list[str]:
     """The functions that the user writes, without the final semicolon."""
     name = leaf.c_name
@@ -74,6 +79,7 @@ def prototypes(leaf: Leaf, bus: Bus) -> list[str]:
     return [f"canopy_status_t {name}_tick({own})"]
 
 
+@emits_c
 def function_names(leaf: Leaf, bus: Bus) -> list[str]:
     """What the user calls these functions."""
     return [prototype.partition("(")[0].split()[-1] for prototype in prototypes(leaf, bus)]
@@ -83,6 +89,7 @@ def _spaced(c_type: str) -> str:
     return c_type if c_type.endswith("*") else f"{c_type} "
 
 
+@emits_c
 def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[tuple[str, str]]:
     """(declaration, comment) of the members of the ports struct that a port becomes."""
     notes = [port.description.rstrip(".") + "."] if port.description else []
@@ -100,44 +107,27 @@ def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[
     return members
 
 
-def setters(leaf: Leaf, counted: set[tuple[str, str]]) -> list[str]:
-    """The C functions with which the user writes output ports, one text each."""
-    functions = []
-    for port in leaf.ports:
-        if not port.writes:
-            continue
-        is_user = port.type.kind == "user"
-        value = f"const {port.type.c} *value" if is_user else f"{port.type.c} value"
-        c = "*value" if is_user else "value"
-        if port.type.kind == "text":
-            value, c = f"{leaf.text_type} value", "(uint16_t)value"
-        lines = [
-            f"/** Writes port {port.name}. Nothing happens where the tree does not connect it. */",
-            f"static inline void {leaf.c_name}_set_{port.c_name}(const {leaf.c_name}_ports_t *ports, {value})",
-            "{",
-            f"    if (ports->{port.c_name} != NULL) {{",
-            f"        *ports->{port.c_name} = {c};",
-            "    }",
-        ]
-        if (leaf.id, port.name) in counted:
-            lines += [
-                f"    if (ports->{port.c_name}_updates != NULL) {{",
-                f"        (*ports->{port.c_name}_updates)++;",
-                "    }",
-            ]
-        functions.append("\n".join([*lines, "}"]))
-    return functions
+@emits_c
+def setter(leaf: Leaf, port: Port) -> tuple[str, str]:
+    """(parameter, expression to store) of the C function with which the user writes an output port."""
+    if port.type.kind == "text":
+        return f"{leaf.text_type} value", "(uint16_t)value"
+    if port.type.kind == "user":
+        return f"const {port.type.c} *value", "*value"
+    return f"{port.type.c} value", "value"
 
 
 def _stored(kind: PortType) -> str:
     return "uint16_t" if kind.kind == "text" else kind.c
 
 
+@emits_c
 def entry_type(entry: Entry) -> str:
     """The C type of an entry's member. Texts are places in the table of texts."""
     return _stored(entry.type)
 
 
+@emits_c
 def item_type(queue: PortType) -> str:
     """The C type of a queue's items."""
     return "uint16_t" if queue.holds_texts else queue.item
@@ -148,6 +138,7 @@ def writes_texts(leaf: Leaf) -> bool:
     return any(port.writes and port.type.holds_texts for port in leaf.ports)
 
 
+@emits_c
 def text_constants(leaf: Leaf, texts: Sequence[str]) -> list[tuple[str, int, str]]:
     """(C name, place in the table, text) of what the leaf may write."""
     if not writes_texts(leaf):

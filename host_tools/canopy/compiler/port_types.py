@@ -14,6 +14,7 @@ from typing import Literal
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.numbers import exact, plain
+from canopy.escape.c import emits_c, string
 
 Kind = Literal["bool", "int", "fixed", "duration", "float", "text", "user", "any"]
 
@@ -206,6 +207,7 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     return PortType("user", normal)
 
 
+@emits_c
 def literal(text: str, kind: PortType, where: str, place: Place) -> str:
     """The C literal of a value of that type.
 
@@ -217,7 +219,7 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
             raise CompileError(place, f"{where}: '{text}' is not a bool", "write true or false")
         return "true" if text.lower() in ("true", "1") else "false"
     if kind.kind == "text":
-        return c_string(text)
+        return string(text)
     if kind.kind == "float":
         try:
             value = float(text)
@@ -262,17 +264,9 @@ def _steps(text: str, kind: PortType, where: str, place: Place) -> int:
     return int(steps)
 
 
+@emits_c
 def integer(value: int, kind: PortType) -> str:
     """The C literal of a whole number, or of a number of steps, that the type can hold."""
     bits = int("".join(c for c in kind.c if c.isdigit()))
     macro = f"{'U' if kind.low == 0 else ''}INT{bits}_C"
     return f"({macro}({value + 1}) - 1)" if value == kind.low and value < 0 else f"{macro}({value})"
-
-
-def c_string(text: str) -> str:
-    """A C string literal with exactly these characters, in UTF-8."""
-    escaped = "".join(
-        f"\\{chr(byte)}" if byte in b'"\\' else chr(byte) if 32 <= byte < 127 and byte != 63 else f"\\{byte:03o}"
-        for byte in text.encode()
-    )
-    return f'"{escaped}"'

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.table import Row
+from canopy.escape.c import emits_c
 
 
+@emits_c
 def place_constant(app: str, leaf: Leaf | None) -> str:
     """Name of the constant that is a kind's place in the table of leaves or of control nodes; None: runs scripts."""
     if leaf is None:
@@ -14,6 +16,7 @@ def place_constant(app: str, leaf: Leaf | None) -> str:
     return f"{app}_{'control' if leaf.is_inner else 'leaf'}_{leaf.c_name}".upper()
 
 
+@emits_c
 def row_fields(app: str, row: Row) -> list[str]:
     """The members of a node's entry in the node table; those that its type does not use are left out."""
     node = row.node

@@ -11,6 +11,7 @@ from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
 from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
 from canopy.compiler.tree import Script
+from canopy.escape.c import emits_c
 
 
 def entry_value(script: Script) -> Entry | SignalName | str:
@@ -173,6 +174,7 @@ class Bodies:
         return [f"return {stripped(compiler.storing.parameter(value, script.least))};"]
 
 
+@emits_c
 def initial_lines(entry: Entry, texts: Texts) -> list[str]:
     """C lines that give an entry the value it begins with: the literal of its SubTree, else 0."""
     member = f"app->entries.{entry.c_name}"

@@ -4,26 +4,15 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from canopy.compiler.bus_reader import Bus
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.emit import environment
 from canopy.compiler.layout import layout
-from canopy.compiler.leaf_c import prototypes
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.table import Table
+from canopy.escape.c import emits_c
 
-HEAD = """\
-/* SPDX-License-Identifier: MIT */
-/**
- * @file
- * The nodes of application {name}, as skeletons to fill in: each one fails until then. Made once by
- * `canopy compile --stubs`, and yours from now on.
- */
-#include "{name}_leaves.h"
-"""
-
-
+@emits_c
 def _body(leaf: Leaf, prototype: str) -> list[str]:
     """Statements that compile without a warning and do the least."""
     arguments = prototype[prototype.index("(") + 1 : -1].split(", ")
@@ -46,32 +35,7 @@ def _body(leaf: Leaf, prototype: str) -> list[str]:
     return [*(f"(void){name};" for name in names if name not in used), *last]
 
 
-def _function(leaf: Leaf, prototype: str) -> str:
-    lines = "\n".join(f"    {line}" for line in _body(leaf, prototype))
-    return f"{prototype}\n{{\n{lines}\n}}\n"
-
-
 def stubs(name: str, table: Table, bus: Bus) -> str:
     """The C file: every function once, in the order of <application>_leaves.h."""
-    parts = [HEAD.format(name=name)]
-    for use in table.users:
-        leaf = use.leaf
-        parts.append(f"/* {leaf.id} ({leaf.kind}), declared at {Path(leaf.place.file).name}:{leaf.place.line} */\n")
-        parts += [_function(leaf, prototype) for prototype in prototypes(leaf, bus)]
-    return layout("\n".join(parts))
-
-
-def write_stubs(path: Path, text: str) -> None:
-    """Writes a new file.
-
-    Raises:
-        CompileError: the file is there already; it is never overwritten.
-        OSError: it cannot be written.
-    """
-    try:
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-    except FileExistsError:
-        raise CompileError(
-            Place(str(path)), "is there already, and is not overwritten", "name a new file, and copy what is missing"
-        ) from None
+    template = environment(bus).get_template("stubs.c.j2")
+    return layout(template.render(name=name, users=table.users, bus=bus, body_of=_body))

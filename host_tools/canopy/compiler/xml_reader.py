@@ -13,6 +13,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.files import FileError, read_bytes
 
 MAX_BYTES = 16 * 1024 * 1024
 MAX_DEPTH = 65_534
@@ -142,10 +143,7 @@ def read_xml(path: Path) -> Element:
         CompileError: the file cannot be read, is larger than 16 MiB, or is not well-formed XML without a DOCTYPE.
     """
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise CompileError(Place(str(path)), f"the file has {size} bytes; at most {MAX_BYTES} are read")
-        data = path.read_bytes()
-    except OSError as error:
-        raise CompileError(Place(str(path)), f"cannot be read: {error.strerror}") from error
+        data = read_bytes(path, MAX_BYTES)
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem) from error
     return _Builder(str(path)).parse(data)

@@ -8,6 +8,16 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x94acdef012d9b010u
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_COOLER_APP_H != 0x94acdef012d9b010u
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x94acdef012d9b010u
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* State words of all nodes together. */
 #define COOLER_WORDS 9u
 

@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x94acdef012d9b010u
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* Climate, 0x100, 4 bytes */
 
 static bool decode_climate(void *input, const uint8_t *data)

@@ -7,6 +7,16 @@
 
 #include "courier_app.h"
 
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x5ba958d802c818c3u
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_COURIER_APP_H != 0x5ba958d802c818c3u
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x5ba958d802c818c3u
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* State words of all nodes together. */
 #define COURIER_WORDS 9u
 

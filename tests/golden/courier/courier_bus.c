@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x5ba958d802c818c3u
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* Pose, 0x100, 4 bytes */
 
 static bool decode_pose(void *input, const uint8_t *data)

@@ -2,6 +2,10 @@
 /** @file Messages as structs of raw values, and back. */
 #include "gripper_codec.h"
 
+#if CANOPY_GENERATED_GRIPPER_CODEC_H != 0xeb01bc7adf1ab96au
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* Parameter, 0x100, 8 bytes */
 
 void gripper_parameter_init(gripper_parameter_t *self)

@@ -12,7 +12,7 @@
  * what it was before. encode goes by the multiplexer's value and does not look at `has_x`.
  */
 #ifndef CANOPY_GENERATED_GRIPPER_CODEC_H
-#define CANOPY_GENERATED_GRIPPER_CODEC_H
+#define CANOPY_GENERATED_GRIPPER_CODEC_H 0xeb01bc7adf1ab96au /* of this run */
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -6,6 +6,16 @@
 
 #include "room_app.h"
 
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xce9219fda46b15fau
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_ROOM_APP_H != 0xce9219fda46b15fau
+#error "files of two runs of canopy: generate them again"
+#endif
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xce9219fda46b15fau
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* State words of all nodes together. */
 #define ROOM_WORDS 0u
 

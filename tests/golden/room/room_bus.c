@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xce9219fda46b15fau
+#error "files of two runs of canopy: generate them again"
+#endif
+
 /* Climate, 0x100, 2 bytes */
 
 static bool decode_climate(void *input, const uint8_t *data)

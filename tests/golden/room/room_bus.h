@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H
+#define CANOPY_GENERATED_ROOM_BUS_H 0xce9219fda46b15fau /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
