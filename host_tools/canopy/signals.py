@@ -6,12 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 
-import cantools.database
 from cantools.database.can import Database
 from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
 from cantools.database.errors import DecodeError
 
+from canopy.compiler.dbc_file import check_timing, load_dbc
+from canopy.compiler.errors import CompileError
 from canopy.model import Model, ModelError
 
 _CYCLES_TO_TIMEOUT = 5  # a message without GenMsgTimeoutTime is stale after so many of its cycles
@@ -114,13 +115,15 @@ def load_database(model: Model) -> Database:
     Raises:
         ModelError: It cannot be read.
     """
+    used = {*model.receive, *model.send}
     try:
-        database = cantools.database.load_file(model.dbc, strict=False)
-    except Exception as error:
-        # cantools lets the exceptions of several parsers through.
-        raise ModelError(f"{model.dbc}: is no DBC that cantools can read: {error}") from error
-    if not isinstance(database, Database):
-        raise ModelError(f"{model.dbc}: is no CAN database")
+        dbc = load_dbc(model.dbc, strict=False)
+        for message in dbc.database.messages:
+            if message.name in used:
+                check_timing(dbc, message)
+    except CompileError as error:
+        raise ModelError(f"{error.place}: {error.message}") from error
+    database: Database = dbc.database
     return database
 
 

@@ -13,7 +13,8 @@ from canopy.check.output import as_json, as_sarif, print_text
 from canopy.check.registry import Rule, Severity
 from canopy.check.rules import all_rules, table
 from canopy.check.run import BusOptions, Report, check
-from canopy.compiler.cli import read_type_options, type_options
+from canopy.compiler.bounds import PERIOD_MS
+from canopy.compiler.cli import in_range, read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest
 
 FOUND = 1
@@ -39,7 +40,7 @@ def _wanted(disable: tuple[str, ...], least: Severity) -> list[Rule]:
 @click.option("--dbc", type=click.Path(path_type=Path), help="The bus: names of signals are checked, too.")
 @click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
 @click.option(
-    "--period-ms", default=1, type=click.IntRange(1, 3_600_000), help="Also check the cycle times against it."
+    "--period-ms", default=1, type=in_range(PERIOD_MS), help="Also check the cycle times against it."
 )
 @type_options
 @click.option(

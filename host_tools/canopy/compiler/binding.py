@@ -100,7 +100,7 @@ class _Binder:
             if node.leaf is not None and node.bound:
                 bindings.ports[id(node)] = tuple(self._port(node, bound, bindings) for bound in node.bound)
         bindings.entries = tuple(e for e in self._tree.board.entries if not e.is_constant and e.uses)
-        bindings.texts = tuple(self._texts.all) if len(self._texts.all) > 1 or self._uses_text() else ()
+        bindings.texts = self._texts.all if len(self._texts.all) > 1 or self._uses_text() else ()
         return bindings
 
     def _uses_text(self) -> bool:

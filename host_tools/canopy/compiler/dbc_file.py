@@ -13,7 +13,7 @@ import cantools
 import cantools.database.can
 from cantools.database.errors import Error as DatabaseError
 
-from canopy.compiler.bounds import Limits, whole
+from canopy.compiler.bounds import DATA_ID, TIME_MS, Limits, whole
 from canopy.compiler.dbc_text import DbcText
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.files import FileError, read_bytes
@@ -63,8 +63,8 @@ def read_dbc(path: Path) -> bytes:
     return data
 
 
-def load_dbc(path: Path) -> Dbc:
-    """A DBC file, in cantools' strict mode.
+def load_dbc(path: Path, *, strict: bool = True) -> Dbc:
+    """A DBC file, in cantools' strict mode: no two signals overlap, and none is longer than its message.
 
     Raises:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
@@ -74,7 +74,7 @@ def load_dbc(path: Path) -> Dbc:
     text = DbcText(str(path), content)
     try:
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
-        database = cantools.database.load_string(content, database_format="dbc", strict=True)
+        database = cantools.database.load_string(content, database_format="dbc", strict=strict)
     except (DatabaseError, ValueError, LookupError, ArithmeticError, TypeError, AttributeError) as error:
         # The last four are what cantools does not catch itself: an attribute's type that is none, an index of an enum.
         raise CompileError(place, f"not a DBC that can be read: {error}") from error
@@ -132,6 +132,12 @@ def number(dbc: Dbc, name: str, message: Any, signal: Any = None) -> Decimal | N
             f"attribute {name} of {_owner(message, signal)} is {value!r}, and must be a number",
         )
     return result
+
+
+def check_timing(dbc: Dbc, message: Any) -> None:
+    """Raises CompileError when a time or the data id of a message is not one that the runtime can have."""
+    for name, limits in (("GenMsgCycleTime", TIME_MS), ("GenMsgTimeoutTime", TIME_MS), ("E2EDataId", DATA_ID)):
+        attribute(dbc, name, limits, message)
 
 
 def attribute(dbc: Dbc, name: str, limits: Limits, message: Any, signal: Any = None) -> int | None:

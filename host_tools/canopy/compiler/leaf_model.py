@@ -26,6 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from canopy.compiler.bounds import PORTS_MAX
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
@@ -212,6 +213,8 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
             if any(port.c_name == other.c_name for other in draft.ports):
                 raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
             draft.ports.append(port)
+            if len(draft.ports) > PORTS_MAX:
+                raise CompileError(child.place, f"'{leaf_id}' has more than {PORTS_MAX} ports")
         elif child.tag == "MetadataFields":
             _read_metadata(child, draft)
         elif child.tag != "description":

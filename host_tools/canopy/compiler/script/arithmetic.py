@@ -68,16 +68,13 @@ class Arithmetic:
         if isinstance(value, Double):
             return value.c
         if isinstance(value, Const):
-            try:
-                return repr(float(value.value))
-            except OverflowError:
-                raise ScriptError(index, "a number that is too large for floating point") from None
+            return repr(_as_float(value.value, index))
         if isinstance(value, Num):
             text = f"(double){value.c}"
             if value.scale.numerator != 1:
-                text += f" * {float(value.scale.numerator)!r}"
+                text += f" * {_as_float(value.scale.numerator, index)!r}"
             if value.scale.denominator != 1:
-                text += f" / {float(value.scale.denominator)!r}"
+                text += f" / {_as_float(value.scale.denominator, index)!r}"
             return text if value.scale == 1 else f"({text})"
         raise ScriptError(index, f"{describe(value)} is no number")
 
@@ -327,6 +324,16 @@ class Arithmetic:
         if isinstance(yes, (TextConst, TextVar)) and isinstance(no, (TextConst, TextVar)):
             return TextVar(f"(uint16_t)({condition.c} ? {self.text(yes)} : {self.text(no)})")
         raise ScriptError(index, f"'?:' chooses between {describe(yes)} and {describe(no)}", "both must be of one kind")
+
+
+def _as_float(value: Fraction | int, index: int) -> float:
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ScriptError(index, "a number that is too large for floating point") from None
+    if result == 0 and value != 0:
+        raise ScriptError(index, "a number that is too small for floating point")
+    return result
 
 
 def _step(value: Num | Const) -> Fraction:

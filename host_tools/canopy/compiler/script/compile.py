@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -51,14 +52,17 @@ class UntypedError(Exception):
 class Texts:
     """The application's table of texts: each one once, in the order in which they were first met."""
 
-    def __init__(self) -> None:
-        self.all: list[str] = [""]
+    def __init__(self, known: Iterable[str] = ()) -> None:
+        self._places = {text: place for place, text in enumerate(known)} or {"": 0}
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """The table."""
+        return tuple(self._places)
 
     def index(self, text: str) -> int:
         """The text's place in the table; 0 is the empty text, which entries begin with."""
-        if text not in self.all:
-            self.all.append(text)
-        return self.all.index(text)
+        return self._places.setdefault(text, len(self._places))
 
 
 def guess(text: str) -> Const | TextConst:
