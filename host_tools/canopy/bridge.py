@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Iterable
@@ -15,6 +14,9 @@ import can
 import click
 
 from canopy.canbus import CanBusError, is_plain_data, open_bus
+from canopy.escape import lcm_text
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo
 from canopy.lcm_link import CHANNEL_TREE, CHANNEL_TREE_STRUCTURE, DEFAULT_URL, open_lcm, utime_now
 from canopy.model import CATEGORIES, Model, ModelError, load_model
 from canopy.stop import StopFlag
@@ -99,7 +101,7 @@ class Bridge:
             self.summary.incomplete += not view.complete
             self.summary.overruns = view.overruns
             if view.lost and not self.summary.lost:
-                click.echo(
+                echo(
                     f"canopy bridge: trace frames are lost on the way ({view.lost} at tick {view.tick}); "
                     "further ones are counted (trace_lost), not printed",
                     err=True,
@@ -114,7 +116,7 @@ class Bridge:
             self._link.publish(channel, message.encode())
         except OSError as error:
             if not self.summary.publish_failed:
-                click.echo(f"canopy bridge: LCM cannot publish: {error}; further failures are counted", err=True)
+                echo(f"canopy bridge: LCM cannot publish: {error}; further failures are counted", err=True)
             self.summary.publish_failed += 1
         else:
             self.summary.published += 1
@@ -127,7 +129,7 @@ def status_message(model: Model, view: TreeView, utime: int) -> Any:
     health = view.health or Health()
     message = tree_status_t()
     message.utime = utime
-    message.application = model.application
+    message.application = lcm_text.text(model.application)
     message.model_hash = model.hash
     message.tick = view.tick
     message.num_nodes = len(view.statuses)
@@ -148,13 +150,13 @@ def structure_message(model: Model) -> Any:
 
     message = tree_structure_t()
     message.utime = utime_now()
-    message.application = model.application
+    message.application = lcm_text.text(model.application)
     message.model_hash = model.hash
-    message.tree_id = model.tree_id
+    message.tree_id = lcm_text.text(model.tree_id)
     message.num_nodes = len(model.nodes)
     message.parent = [-1 if node.parent is None else node.parent for node in model.nodes]
-    message.type = [node.type for node in model.nodes]
-    message.name = [node.name for node in model.nodes]
+    message.type = [lcm_text.text(node.type) for node in model.nodes]
+    message.name = [lcm_text.text(node.name) for node in model.nodes]
     message.category = [CATEGORIES.index(node.category) for node in model.nodes]
     return message
 
@@ -210,10 +212,10 @@ def command(
             with open_bus(bus_name) as bus:
                 bridge = Bridge(model, open_lcm(lcm_url, "canopy bridge"), structure_period)
                 bridge.idle()
-                click.echo(f"canopy bridge: {model.application} on {bus_name}", err=True)
+                echo(f"canopy bridge: {model.application} on {bus_name}", err=True)
                 run(bridge, bus, stop, duration)
         except (ModelError, CanBusError, can.CanError) as error:
-            click.echo(f"canopy bridge: {error}", err=True)
+            echo(f"canopy bridge: {error}", err=True)
             sys.exit(1)
         summary = bridge.end()
-    click.echo(json.dumps(asdict(summary)) if as_json else summary.text())
+    echo(dumps(asdict(summary)) if as_json else summary.text())

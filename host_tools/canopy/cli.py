@@ -9,6 +9,7 @@ import sys
 import click
 
 from canopy import __version__
+from canopy.escape.terminal import CleanCommand, echo
 
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
@@ -27,7 +28,7 @@ SUBCOMMANDS = {
 }
 
 
-class _LazyGroup(click.Group):
+class _LazyGroup(CleanCommand, click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(SUBCOMMANDS)
 
@@ -41,7 +42,7 @@ class _LazyGroup(click.Group):
             if error.name is None or error.name.startswith("canopy"):
                 raise
             extra = "can" if error.name == "can" else error.name
-            click.echo(
+            echo(
                 f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
             )
             sys.exit(1)

@@ -21,6 +21,7 @@ import click
 
 from canopy.canbus import CanBusError, is_plain_data, open_bus
 from canopy.children import ChildError, Children
+from canopy.escape.terminal import echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL, open_lcm
 from canopy.model import Model, ModelError, load_model
 from canopy.stop import StopFlag
@@ -275,12 +276,12 @@ def run_parts(build_dir: Path, spec: str | None, stop: StopFlag) -> list[Result]
         spec = choose_bus(spec, folder)
         with_lcm = open_lcm(DEFAULT_URL, "canopy demo") is not None
         lcm_text = ", and on LCM (`canopy spy` shows it)" if with_lcm else ""
-        click.echo(f"Two controllers, one after the other, with the simulated robot on {spec}{lcm_text}.")
+        echo(f"Two controllers, one after the other, with the simulated robot on {spec}{lcm_text}.")
         demo = Demo(build_dir, spec, with_lcm, folder, stop)
         for number, part in enumerate(PARTS, 1):
             title = f"{number} of {len(PARTS)}: {part.application}: {part.title}"
             if not sys.stdout.isatty():  # on a terminal it is in the picture
-                click.echo(title)
+                echo(title)
             with make_display(False, _LINE_PERIOD_S) as display:
                 results.append(demo.run(part, display, title))
     return results
@@ -314,12 +315,13 @@ def command(build_dir: Path, bus_name: str | None) -> None:
         try:
             results = run_parts(build_dir, bus_name, stop)
         except InterruptedDemo:
-            click.echo("canopy demo: interrupted; all it had started has ended", err=True)
+            echo("canopy demo: interrupted; all it had started has ended", err=True)
             sys.exit(130)
         except (DemoError, ChildError, ModelError, CanBusError, can.CanError) as error:
-            click.echo(f"canopy demo: {error}", err=True)
+            echo(f"canopy demo: {error}", err=True)
             sys.exit(1)
-    click.echo("\nSummary")
+    echo()
+    echo("Summary")
     for result in results:
-        click.echo(result.text())
+        echo_lines(result.text())
     sys.exit(0 if all(result.succeeded for result in results) else 1)

@@ -24,14 +24,17 @@ _KINDS = {
     stat.S_IFSOCK: "is a socket, not a file",
 }
 
+_NONE = (errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG)
+
 
 class FileError(Exception):
-    """A file cannot be read or written; `problem` says why, without the file's name."""
+    """A file cannot be read or written; `problem` says why, without the file's name. `missing`: there is none."""
 
-    def __init__(self, path: Path, problem: str) -> None:
+    def __init__(self, path: Path, problem: str, *, missing: bool = False) -> None:
         super().__init__(f"{path}: {problem}")
         self.path = path
         self.problem = problem
+        self.missing = missing
 
 
 def check_name(path: Path) -> None:
@@ -64,8 +67,9 @@ def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
             data = file.read(largest + 1) if status.st_size <= largest else b""
             size = max(status.st_size, len(data))
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        problem = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(path, f"cannot be read: {problem}") from error
+        code = error.errno if isinstance(error, OSError) else None
+        problem = os.strerror(code) if code else str(error)
+        raise FileError(path, f"cannot be read: {problem}", missing=code in _NONE) from error
     if size > largest:
         raise FileError(path, f"the file has {size} bytes; at most {largest} are read")
     return data
@@ -85,6 +89,18 @@ def read_text(path: Path, largest: int = LARGEST) -> str:
         raise FileError(path, f"line {line}: byte 0x{data[error.start]:02x} is not UTF-8; save it as UTF-8") from None
 
 
+def check_file(path: Path) -> None:
+    """For files that a library opens, and that are as large as they are.
+
+    Raises:
+        FileError: it is there and no file: a folder, a FIFO, a device.
+    """
+    check_name(path)
+    kind = _KINDS.get(stat.S_IFMT(path.stat().st_mode)) if path.exists() else None
+    if kind is not None:
+        raise FileError(path, kind)
+
+
 class _Replacement:
     """Files beside their targets, and what brings back the old ones."""
 
@@ -92,13 +108,13 @@ class _Replacement:
         self.staged: list[tuple[Path, Path]] = []
         self.replaced: list[tuple[Path, Path | None]] = []
 
-    def stage(self, path: Path, content: bytes) -> None:
+    def stage(self, path: Path, content: bytes, mode: int) -> None:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=".canopy-")
         self.staged.append((Path(name), path))
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
-            os.fchmod(handle, 0o644)
+            os.fchmod(handle, mode)
             os.fsync(handle)
 
     def commit(self, temporary: Path, path: Path, is_new: bool) -> None:
@@ -132,7 +148,7 @@ class _Replacement:
             leftover.unlink(missing_ok=True)
 
 
-def write_files(files: Mapping[Path, bytes], new: Collection[Path] = ()) -> None:
+def write_files(files: Mapping[Path, bytes], new: Collection[Path] = (), mode: int = 0o644) -> None:
     """Writes all files, or leaves all as they were; the folders are there. Renames in the order given.
 
     All bytes are on the disk before the first file is replaced. Where the machine or the program dies between two
@@ -141,6 +157,7 @@ def write_files(files: Mapping[Path, bytes], new: Collection[Path] = ()) -> None
     Args:
         files: The content of each file.
         new: Those of them that must not be there yet.
+        mode: The files' permissions.
 
     Raises:
         FileExistsError: one of `new` is there.
@@ -148,14 +165,15 @@ def write_files(files: Mapping[Path, bytes], new: Collection[Path] = ()) -> None
         FileError: a file's name is not UTF-8.
     """
     work = _Replacement()
+    protected = {path.absolute() for path in new}
     try:
         for path, content in files.items():
             check_name(path)
             with _about(path):
-                work.stage(path, content)
+                work.stage(_target(path), content, mode)
         for temporary, path in work.staged:
             with _about(path):
-                work.commit(temporary, path, path in new)
+                work.commit(temporary, path, path.absolute() in protected)
     except BaseException:
         work.undo()
         raise
@@ -163,6 +181,17 @@ def write_files(files: Mapping[Path, bytes], new: Collection[Path] = ()) -> None
         work.clean()
     for folder in {path.parent for path in files}:
         _sync_folder(folder)
+
+
+def _target(path: Path) -> Path:
+    """What is replaced: the file, or the one that a link leads to; never a device, whose name would go.
+
+    Raises:
+        FileError: it is no file.
+    """
+    target = path.resolve() if path.is_symlink() else path
+    check_file(target)
+    return target
 
 
 @contextmanager

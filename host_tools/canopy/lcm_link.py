@@ -7,10 +7,11 @@ LCM is how Canopy is watched, never how it works: every tool goes on without it.
 from __future__ import annotations
 
 import socket
-import sys
 import time
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+
+from canopy.escape.terminal import echo
 
 if TYPE_CHECKING:
     import lcm
@@ -52,7 +53,7 @@ def open_lcm(url: str, what: str) -> lcm.LCM | None:
             return lcm.LCM(url)
         except RuntimeError as error:
             trouble = f"{error} with the URL {url}; check the URL"
-    print(f"{what}: going on without LCM: {trouble}", file=sys.stderr, flush=True)
+    echo(f"{what}: going on without LCM: {trouble}", err=True)
     return None
 
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from canopy.files import FileError, read_text
+
 FORMAT = 1
 CATEGORIES = ("control", "decorator", "condition", "action")
 TRACE_MESSAGES = (
@@ -61,6 +63,8 @@ class Model:
     bus_node: str
     receive: tuple[str, ...]
     send: tuple[str, ...]
+    dbc_hash: str | None
+    """Of the DBC that the firmware was built with; None: not known."""
     trace: dict[str, int]
     """Arbitration id of each trace message the DBC has; always CanopyTick."""
 
@@ -81,9 +85,9 @@ def load_model(path: Path) -> Model:
         ModelError: The file or its DBC is not there, or is not what `canopy compile` of this version writes.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path}: cannot be read: {error}; `canopy compile` or the build writes it") from error
+        text = read_text(path)
+    except FileError as error:
+        raise ModelError(f"{path}: {error.problem}; `canopy compile` or the build writes it") from error
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -116,6 +120,7 @@ class _Reader:
             tree_id=self._get(tree, "tree.", "id", str),
             nodes=self._nodes(self._get(tree, "tree.", "nodes", list)),
             dbc=self._path.parent / self._get(bus, "bus.", "dbc", str),
+            dbc_hash=self._get(bus, "bus.", "dbc_hash", str) if "dbc_hash" in bus else None,
             bus_node=self._get(bus, "bus.", "node", str),
             receive=self._list(bus, "bus.", "receive", self._name),
             send=self._list(bus, "bus.", "send", self._name),

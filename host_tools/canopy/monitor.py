@@ -11,6 +11,7 @@ import can
 import click
 
 from canopy.canbus import CanBusError, is_plain_data, open_bus
+from canopy.escape.terminal import echo
 from canopy.model import ModelError, load_model
 from canopy.stop import StopFlag
 from canopy.view import Display, make_display
@@ -68,5 +69,5 @@ def command(model_path: Path, bus_name: str, period: float, duration: float | No
             with open_bus(bus_name) as bus, make_display(as_json, period) as display:
                 run(watch, bus, display, stop, duration, f"{watch.model.application} on {bus_name}  (Ctrl-C ends)")
         except (ModelError, CanBusError, can.CanError) as error:
-            click.echo(f"canopy monitor: {error}", err=True)
+            echo(f"canopy monitor: {error}", err=True)
             sys.exit(1)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import socket
 import sys
 import time
@@ -17,6 +16,9 @@ import click
 from can.interfaces.socketcan import SocketcanBus
 
 from canopy.canbus import CanBusError, is_plain_data, open_bus, receive_losses, split_spec
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import Styled, echo
+from canopy.files import FileError, check_file
 from canopy.model import Model, ModelError, load_model
 from canopy.stop import StopFlag
 from canopy.trace import TraceDecoder, TreeView
@@ -30,6 +32,7 @@ _REST_S = 2.0
 _TERMINAL_PERIOD_S = 0.5
 _LINE_PERIOD_S = 10.0
 _RECEIVE_BUFFER = 4 << 20
+_LINE_START, _CLEAR = Styled("\r"), Styled("\x1b[K")
 
 
 class RecordError(Exception):
@@ -118,7 +121,7 @@ class Recorder:
     def _tell(self, text: str) -> None:
         if text not in self._told:
             self._told.add(text)
-            click.echo(f"canopy record: {text}", err=True)
+            echo(f"canopy record: {text}", err=True)
 
 
 class _Progress:
@@ -133,11 +136,12 @@ class _Progress:
 
     def show(self, text: str) -> None:
         self._due = time.monotonic() + (_TERMINAL_PERIOD_S if self._terminal else _LINE_PERIOD_S)
-        click.echo(f"\r{text}\x1b[K" if self._terminal else text, err=True, nl=not self._terminal)
+        before, after = (_LINE_START, _CLEAR) if self._terminal else (Styled(), Styled())
+        echo(before, text, after, err=True, nl=not self._terminal)
 
     def end(self) -> None:
         if self._terminal:
-            click.echo("\r\x1b[K", err=True, nl=False)
+            echo(_LINE_START, _CLEAR, err=True, nl=False)
 
 
 @contextmanager
@@ -150,6 +154,7 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
     if path.suffix.lower() not in SUFFIXES:
         raise RecordError(f"{path}: the suffix says the format, and must be one of {', '.join(SUFFIXES)}")
     try:
+        check_file(path)
         with path.open("wb" if force else "xb"):  # can.Logger would overwrite without a word
             pass
         writer = can.Logger(path)
@@ -157,6 +162,8 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
         raise RecordError(f"{path}: is there already; give another name, or --force to overwrite it") from None
     except OSError as error:
         raise RecordError(f"{path}: cannot be written: {error.strerror}") from error
+    except FileError as error:
+        raise RecordError(str(error)) from error
     assert isinstance(writer, can.io.generic.MessageWriter)
     try:
         yield writer
@@ -201,7 +208,7 @@ def _record(spec: str, output: Path, model: Model | None, force: bool, duration:
         if isinstance(bus, SocketcanBus):  # the kernel gives as much of it as it likes
             bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         recorder = Recorder(writer, output, _channel(spec), model)
-        click.echo(f"canopy record: {spec} to {output}  (Ctrl-C ends)", err=True)
+        echo(f"canopy record: {spec} to {output}  (Ctrl-C ends)", err=True)
         run(recorder, bus, stop, duration)
     return recorder
 
@@ -243,9 +250,9 @@ def command(
         model = load_model(model_path) if model_path is not None else None
         recorder = _record(bus_name, output, model, force, duration)
     except (ModelError, RecordError, CanBusError, can.CanError, OSError) as error:
-        click.echo(f"canopy record: {error}", err=True)
+        echo(f"canopy record: {error}", err=True)
         sys.exit(1)
     summary = recorder.summary
-    click.echo(json.dumps(asdict(summary)) if as_json else f"canopy record: {output}: {summary.text()}")
+    echo(dumps(asdict(summary)) if as_json else f"canopy record: {output}: {summary.text()}")
     if recorder.decoder is not None and recorder.decoder.mismatch is not None:
         sys.exit(1)

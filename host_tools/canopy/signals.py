@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -11,8 +12,9 @@ from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
 from cantools.database.errors import DecodeError
 
-from canopy.compiler.dbc_file import check_timing, load_dbc
+from canopy.compiler.dbc_file import check_timing, parse_dbc
 from canopy.compiler.errors import CompileError
+from canopy.files import FileError, read_bytes
 from canopy.model import Model, ModelError
 
 _CYCLES_TO_TIMEOUT = 5  # a message without GenMsgTimeoutTime is stale after so many of its cycles
@@ -117,7 +119,13 @@ def load_database(model: Model) -> Database:
     """
     used = {*model.receive, *model.send}
     try:
-        dbc = load_dbc(model.dbc, strict=False)
+        data = read_bytes(model.dbc)
+    except FileError as error:
+        raise ModelError(f"{model.dbc}: {error.problem}") from error
+    if model.dbc_hash not in (None, hashlib.sha256(data).hexdigest()[:16]):
+        raise ModelError(f"{model.dbc}: is not the DBC that {model.path.name} was written with: build again")
+    try:
+        dbc = parse_dbc(model.dbc, data, strict=False)
         for message in dbc.database.messages:
             if message.name in used:
                 check_timing(dbc, message)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 
+from canopy.escape.terminal import echo
 from canopy.lcm_link import DEFAULT_URL
 
 
@@ -98,7 +99,7 @@ def command(jar: Path | None, lcm_url: str) -> None:
     try:
         arguments, environment = command_line(jar, lcm_url)
     except SpyError as error:
-        click.echo(f"canopy spy: {error}", err=True)
+        echo(f"canopy spy: {error}", err=True)
         sys.exit(1)
     # In place of this process, so that signals and the exit status are lcm-spy's own.
     os.execve(arguments[0], arguments, environment)

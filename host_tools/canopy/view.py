@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import Counter
 from types import TracebackType
 from typing import Protocol
 
-import click
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.panel import Panel
@@ -17,6 +15,8 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo, styled
 from canopy.model import Node
 from canopy.trace import Status, TreeView, status_name
 from canopy.watch import Watch
@@ -73,10 +73,10 @@ def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> R
     table.add_column(ratio=1)
     table.add_column(ratio=1)
     table.add_row(
-        Panel(_tree(watch, silent, ascii_only), title=Text(watch.model.tree_id), title_align="left"),
+        Panel(_tree(watch, silent, ascii_only), title=styled(watch.model.tree_id), title_align="left"),
         Panel(_signals(watch, now), title="signals", title_align="left"),
     )
-    return Group(Text(title, style="bold"), table, _footer(watch, now))
+    return Group(styled(title, style="bold"), table, _footer(watch, now))
 
 
 def _tree(watch: Watch, silent: bool, ascii_only: bool) -> Tree:
@@ -101,7 +101,7 @@ def _label(node: Node, code: int, silent: bool, ascii_only: bool) -> Text:
         head = f"[{node.name}]"
     else:
         head = f"<{node.type}> {node.name}"
-    return Text.assemble((head, style), "  ", (f"was {shown.name}" if before else shown.name, style))
+    return styled((head, style), "  ", (f"was {shown.name}" if before else shown.name, style))
 
 
 def _signals(watch: Watch, now: float) -> Table:
@@ -111,10 +111,10 @@ def _signals(watch: Watch, now: float) -> Table:
         if reading.message != message:
             message = reading.message
             direction = "sends" if reading.sent else "receives"
-            table.add_row(Text(message, style="bold"), Text(direction, style="bright_black"))
+            table.add_row(styled(message, style="bold"), styled(direction, style="bright_black"))
         style = "red" if reading.stale else "bright_black" if reading.value is None else "cyan"
         table.add_row(
-            Text(f"  {reading.signal}"), Text(reading.text + (" stale" if reading.stale else ""), style=style)
+            styled(f"  {reading.signal}"), styled(reading.text + (" stale" if reading.stale else ""), style=style)
         )
     return table
 
@@ -122,9 +122,9 @@ def _signals(watch: Watch, now: float) -> Table:
 def _footer(watch: Watch, now: float) -> Text:
     view = watch.view
     if view is None:
-        return Text("no trace yet", style="bold red")
+        return styled("no trace yet", style="bold red")
     lossless = not (view.lost or view.refused)
-    return Text.assemble(
+    return styled(
         (f"tick {view.tick}  ", "bold"),
         (f"{status_name(view.root_status)}  ", _STYLES[Status(view.root_status)]),
         (_pace(watch, now), "bold red" if watch.silent_for(now) is not None else ""),
@@ -189,7 +189,7 @@ class LineDisplay:
         elif not new_tick:
             return
         # click.echo flushes, and writes no colours.
-        click.echo(json.dumps(watch.snapshot(now)) if self._as_json else line(watch, now))
+        echo(dumps(watch.snapshot(now)) if self._as_json else line(watch, now))
 
 
 class LiveDisplay:

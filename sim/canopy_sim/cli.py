@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import signal
 import sys
@@ -15,6 +14,8 @@ import can
 import click
 
 from canopy.canbus import CanBusError, open_bus, split_spec
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
 from canopy_sim.lcm_side import open_lcm_side
 from canopy_sim.messages import DescriptionError, RobotMessages, load_messages
@@ -90,6 +91,7 @@ def make_plant(power: tuple[int, int], posture: tuple[int, int]) -> Plant:
 
 
 @click.command(
+    cls=CleanCommand,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="""\b
 Examples:
@@ -163,16 +165,16 @@ def main(
     try:
         bus = open_bus(bus_name)
     except CanBusError as error:
-        click.echo(f"canopy-sim: {error}", err=True)
+        echo(f"canopy-sim: {error}", err=True)
         sys.exit(1)
     with bus:
         lcm_side = None if no_lcm else open_lcm_side(lcm_url, robot.execute)
         simulation = Simulation(bus, messages, robot, lcm_side, steps)
         mode = "lock-step" if lock_step else "real time"
-        click.echo(f"canopy-sim: {mode} on {bus_name}", err=True)
+        echo(f"canopy-sim: {mode} on {bus_name}", err=True)
         ended_by = _run(simulation, lock_step, time_factor or 1.0)
         summary = summarise(simulation, mode, ended_by)
-    click.echo(json.dumps(summary) if as_json else summary_text(summary))
+    echo_lines(dumps(summary) if as_json else summary_text(summary))
     sys.exit(1 if ended_by == "failure" else 0)
 
 
@@ -193,6 +195,6 @@ def _run(simulation: Simulation, lock_step: bool, time_factor: float) -> str:
         else:
             simulation.run_real_time(time_factor)
     except (BusGoneError, can.CanError) as error:
-        click.echo(f"canopy-sim: {error}", err=True)
+        echo(f"canopy-sim: {error}", err=True)
         return "failure"
     return ended_by

@@ -6,10 +6,10 @@ liblcm receives in a thread of its own; poll() only takes what is there, so the 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from canopy.escape.terminal import echo
 from canopy.lcm_link import CHANNEL_ROBOT, CHANNEL_ROBOT_COMMAND, open_lcm, utime_now
 from canopy_sim.robot import CommandKind, DeskCommand, RobotState
 
@@ -79,7 +79,7 @@ class LcmSide:
             self._execute(command)
         except Exception as error:  # decode() raises whatever struct raises; nothing on LCM may end the robot
             self.refused += 1
-            print(f"canopy-sim: {CHANNEL_ROBOT_COMMAND} refused: {error}", file=sys.stderr, flush=True)
+            echo(f"canopy-sim: {CHANNEL_ROBOT_COMMAND} refused: {error}", err=True)
         else:
             self.commands += 1
 

@@ -175,7 +175,7 @@ def _compiler() -> Compiler:
     for name, kind in KINDS.items():
         target = board.main.resolve(name, Place("x"))
         assert isinstance(target, Entry)
-        target.uses.append(Use(read_type(kind, "test", Place("x"), Options()), Place("x"), "test", True))
+        target.connect(Use(read_type(kind, "test", Place("x"), Options()), Place("x"), "test", True))
         target.settle_type()
     return Compiler(board.main, Place("x"), read_bus(DBC, "Controller", 10), Texts(), floats=False)
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -16,6 +15,8 @@ from canopy.check.run import BusOptions, Report, check
 from canopy.compiler.bounds import PERIOD_MS
 from canopy.compiler.cli import in_range, read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo_lines
 
 FOUND = 1
 INPUT_ERROR = 2
@@ -23,7 +24,7 @@ INPUT_ERROR = 2
 
 def _print_rules(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
     if value:
-        click.echo(table(), nl=False)
+        echo_lines(table())
         context.exit()
 
 
@@ -95,7 +96,7 @@ def command(
     try:
         types = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
     except CompileError as error:
-        click.echo(str(error), err=True)
+        echo_lines(str(error), err=True)
         sys.exit(INPUT_ERROR)
     report = Report()
     unreadable = False
@@ -103,15 +104,15 @@ def command(
         try:
             one = check(tree, rules, bus, types)
         except CompileError as error:
-            click.echo(str(error), err=True)
+            echo_lines(str(error), err=True)
             unreadable = True
             continue
         report.findings += one.findings
         report.allowed += one.allowed
     if json_:
-        click.echo(json.dumps(as_json(report), indent=1, ensure_ascii=False))
+        echo_lines(dumps(as_json(report), indent=1))
     elif sarif:
-        click.echo(json.dumps(as_sarif(report, rules), indent=1, ensure_ascii=False))
+        echo_lines(dumps(as_sarif(report, rules), indent=1))
     elif report.findings or not unreadable:
         print_text(report, quiet=quiet)
     if unreadable:

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import PurePath
-
-import click
+from urllib.parse import quote
 
 from canopy import __version__
 from canopy.check.registry import Rule, Severity
 from canopy.check.run import Finding, Report
+from canopy.escape.json_text import sarif_message
+from canopy.escape.terminal import echo, style
 
 JSON_FORMAT = 1
 SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -36,11 +37,11 @@ def print_text(report: Report, *, quiet: bool = False) -> None:
     """Findings as a compiler prints them; colours are dropped by click when the output is no terminal."""
     for finding in report.findings:
         severity = finding.rule.severity
-        word = click.style(severity.label, fg=_COLOURS[severity], bold=True)
-        click.echo(f"{finding.place}: {word}: {finding.message} [{finding.rule.id}]")
+        word = style(severity.label, fg=_COLOURS[severity], bold=True)
+        echo(f"{finding.place}: ", word, f": {finding.message} [{finding.rule.id}]")
         if not quiet:
-            click.echo(f"  help: {finding.help_text}")
-    click.echo(summary(report))
+            echo(f"  help: {finding.help_text}")
+    echo(summary(report))
 
 
 def as_json(report: Report) -> dict[str, object]:
@@ -66,7 +67,7 @@ def as_json(report: Report) -> dict[str, object]:
 
 
 def _location(finding: Finding) -> dict[str, object]:
-    physical: dict[str, object] = {"artifactLocation": {"uri": PurePath(finding.place.file).as_posix()}}
+    physical: dict[str, object] = {"artifactLocation": {"uri": quote(PurePath(finding.place.file).as_posix())}}
     if finding.place.line:
         physical["region"] = {"startLine": finding.place.line, "startColumn": max(1, finding.place.column)}
     location: dict[str, object] = {"physicalLocation": physical}
@@ -106,7 +107,7 @@ def as_sarif(report: Report, rules: Iterable[Rule]) -> dict[str, object]:
                         "ruleId": finding.rule.id,
                         "ruleIndex": places[finding.rule.id],
                         "level": finding.rule.severity.label,
-                        "message": {"text": f"{finding.message}. {finding.help_text}"},
+                        "message": {"text": sarif_message(f"{finding.message}. {finding.help_text}")},
                         "locations": [_location(finding)],
                     }
                     for finding in report.findings

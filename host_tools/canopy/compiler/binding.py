@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from canopy.compiler.blackboard import Entry, SignalName, Use
 from canopy.compiler.bus_reader import Bus
@@ -44,6 +46,11 @@ class Bindings:
     ports: dict[int, tuple[BoundPort, ...]] = field(default_factory=dict)
     counted_ports: set[tuple[str, str]] = field(default_factory=set)
 
+    @cached_property
+    def text_places(self) -> dict[str, int]:
+        """The place of each text."""
+        return {text: place for place, text in enumerate(self.texts)}
+
 
 def preorder(root: Node) -> list[Node]:
     """All nodes, depth first, without recursion."""
@@ -73,6 +80,7 @@ class _Binder:
         self._nodes = preorder(tree.root)
         self._parsed: dict[int, tuple[Expression, ...]] = {}
         self._assigned: dict[int, list[tuple[Script, Assignment]]] = {}
+        self._setting: dict[int, list[Script]] = {}
 
     def bind(self) -> Bindings:
         """Everything, in the order in which each step needs the one before."""
@@ -82,6 +90,9 @@ class _Binder:
         self._check_existing()
         for entry in self._tree.board.entries:
             entry.settle_type()
+        for script in self._tree.scripts:
+            if script.role == "set":
+                self._setting.setdefault(id(script.target), []).append(script)
         self._infer()
         leaves = self._settle_ports()
         self._check_entries()
@@ -100,7 +111,8 @@ class _Binder:
             if node.leaf is not None and node.bound:
                 bindings.ports[id(node)] = tuple(self._port(node, bound, bindings) for bound in node.bound)
         bindings.entries = tuple(e for e in self._tree.board.entries if not e.is_constant and e.uses)
-        bindings.texts = self._texts.all if len(self._texts.all) > 1 or self._uses_text() else ()
+        texts = self._texts.all
+        bindings.texts = texts if len(texts) > 1 or self._uses_text() else ()
         return bindings
 
     def _uses_text(self) -> bool:
@@ -121,7 +133,7 @@ class _Binder:
                 place = script.place(statement.index)
                 target = script.scope.resolve(statement.target.name, place)
                 assert isinstance(target, Entry)
-                target.uses.append(Use(ANY, place, f'{script.attribute}="{script.text}"', True))
+                target.connect(Use(ANY, place, f'{script.attribute}="{script.text}"', True))
                 self._assigned.setdefault(id(target), []).append((script, statement))
 
     def _check_existing(self) -> None:
@@ -137,43 +149,62 @@ class _Binder:
                 )
 
     def _infer(self) -> None:
-        """Types of entries that no port declares: from what is written to them, until nothing more is learnt."""
-        learnt = True
-        while learnt:
-            learnt = False
-            for entry in self._tree.board.entries:
-                if entry.type.kind == "any":
-                    kind = self._inferred(entry)
-                    if kind is not None:
-                        entry.type = kind
-                        learnt = True
+        """Types of entries that no port declares: from what is written to them, until nothing more is learnt.
 
-    def _inferred(self, entry: Entry) -> PortType | None:
+        Entries are asked in their order, turn after turn; one that waits for others only when one of these is known.
+        """
+        entries = self._tree.board.entries
+        due = [(0, index) for index in range(len(entries))]
+        waiting: dict[int, list[int]] = {}
+        known = len(entries)
+        while due:
+            turn, index = heapq.heappop(due)
+            entry = entries[index]
+            if entry.type.kind != "any":
+                continue
+            kind, unknown = self._inferred(entry)
+            for new in range(known, len(entries)):
+                heapq.heappush(due, (turn, new))
+            known = len(entries)
+            if kind is None:
+                for other in unknown:
+                    waiting.setdefault(id(other), []).append(index)
+                continue
+            entry.type = kind
+            for other_index in waiting.pop(id(entry), []):
+                heapq.heappush(due, (turn + (other_index < index), other_index))
+
+    def _inferred(self, entry: Entry) -> tuple[PortType | None, list[Entry]]:
+        """The type, or None and the entries whose types would tell it."""
         kinds: list[tuple[PortType, Place]] = []
+        unknown: list[Entry] = []
         if entry.initial is not None and not entry.is_constant:
             kinds.append((self._kind_of(guess(entry.initial), [], entry.place, entry), entry.place))
         for script, statement in self._assigned.get(id(entry), []):
             compiler = self._compiler(script)
             try:
                 value = compiler.evaluate(statement.value)
-            except UntypedError:
+            except UntypedError as error:
+                unknown.append(error.entry)
                 continue
             except ScriptError as error:
                 raise script_error(script, error) from error
             names = parts(statement.value)
             place = script.place(statement.index)
             kinds.append((self._kind_of(value, self._widths(compiler, names), place, entry), place))
-        for script in self._tree.scripts:
-            if script.role == "set" and script.target is entry:
-                found = self._set_kind(script, entry)
-                if found is not None:
-                    kinds.append((found, script.place()))
-        return self._joined(entry, kinds)
+        for script in self._setting.get(id(entry), []):
+            found = self._set_kind(script, entry)
+            if isinstance(found, Entry):
+                unknown.append(found)
+            else:
+                kinds.append((found, script.place()))
+        return self._joined(entry, kinds), unknown
 
-    def _set_kind(self, script: Script, entry: Entry) -> PortType | None:
+    def _set_kind(self, script: Script, entry: Entry) -> PortType | Entry:
+        """The type that a script sets; an entry: the type of this one, once that is known."""
         source = entry_value(script)
         if isinstance(source, Entry) and not source.is_constant:
-            return source.type if source.type.kind != "any" else None
+            return source.type if source.type.kind != "any" else source
         value: Value
         if isinstance(source, SignalName):
             value = self._compiler(script).signal(source.text, 0)
@@ -236,7 +267,7 @@ class _Binder:
         for entry in self._tree.board.entries:
             if not entry.uses or entry.is_constant:
                 continue
-            given = entry.initial is not None or any(use.writes for use in entry.uses)
+            given = entry.initial is not None or entry.is_written
             if not given:
                 use = entry.uses[0]
                 scope = f" of '{entry.path}'" if entry.path else ""
@@ -268,7 +299,9 @@ class _Binder:
                     message = bound.target.text.partition(".")[0]
                     if not bound.target.text.endswith(".fresh") and message not in leaf.reads:
                         leaf = replace(leaf, reads=(*leaf.reads, message))
-                leaf = replace(leaf, ports=tuple(self._settled(port, bound) for port in leaf.ports))
+            if node.bound:
+                both = zip(leaf.ports, node.bound, strict=True)
+                leaf = replace(leaf, ports=tuple(self._settled(port, bound) for port, bound in both))
             leaves[leaf.id] = leaf
         for node in self._nodes:
             if node.leaf is not None:
@@ -279,7 +312,7 @@ class _Binder:
 
     @staticmethod
     def _settled(port: Port, bound: Bound) -> Port:
-        if port.name != bound.port.name or port.type.kind != "any":
+        if port.type.kind != "any":
             return port
         if isinstance(bound.target, Entry):
             kind = bound.target.type

@@ -36,11 +36,17 @@ class Entry:
     initial: str | None = None
     counted: bool = False
     queue: int = 0
+    is_written: bool = False
+
+    def connect(self, use: Use) -> None:
+        """One more end."""
+        self.uses.append(use)
+        self.is_written = self.is_written or use.writes
 
     @property
     def is_constant(self) -> bool:
         """Nothing writes it: it is the literal that its SubTree was given."""
-        return self.initial is not None and not any(use.writes for use in self.uses)
+        return self.initial is not None and not self.is_written
 
     def settle_type(self) -> None:
         """Takes the type from the uses.
@@ -79,16 +85,17 @@ class Blackboard:
     def __init__(self) -> None:
         self.entries: list[Entry] = []
         self.main = Scope(self, "")
-        self._c_names: set[str] = set()
+        self._c_names: dict[str, int] = {}  # with the last number that was put behind it
 
     def make(self, name: str, path: str, place: Place) -> Entry:
         """A new entry, with a C name of its own."""
         stem = snake(f"{path} {name}") if path else snake(name)
-        c_name, number = stem, 1
+        c_name, number = stem, self._c_names.get(stem, 0)
         while c_name in self._c_names:
             number += 1
             c_name = f"{stem}_{number}"
-        self._c_names.add(c_name)
+        self._c_names[stem] = max(number, 1)
+        self._c_names.setdefault(c_name, 1)
         entry = Entry(name, path, c_name, place)
         self.entries.append(entry)
         return entry
@@ -157,7 +164,7 @@ class Scope:
 
 
 def _is_given(entry: Entry) -> bool:
-    return entry.initial is not None or any(use.writes for use in entry.uses)
+    return entry.initial is not None or entry.is_written
 
 
 def pointer(text: str, own_name: str) -> str | None:

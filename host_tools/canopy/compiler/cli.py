@@ -185,7 +185,11 @@ def command(
         images = _images(image_nodes, image_uses)
         application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
         files = render(application)
-        first = {} if stubs_file is None else {stubs_file: stubs(application.name, application.table, application.bus).encode()}
+        first = (
+            {}
+            if stubs_file is None
+            else {stubs_file: stubs(application.name, application.table, application.bus).encode()}
+        )
         if depfile is not None:
             read = [*application.table.tree.files, dbc]
             first |= dependencies(depfile, output / f"{application.name}_app.c", read)

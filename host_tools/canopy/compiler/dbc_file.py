@@ -42,6 +42,18 @@ def decode_dbc(data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def _decoded(path: Path, data: bytes) -> str:
+    try:
+        return decode_dbc(data)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise CompileError(
+            Place(str(path), line),
+            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
+            "save the file as UTF-8",
+        ) from None
+
+
 def read_dbc(path: Path) -> bytes:
     """The bytes of a DBC file.
 
@@ -50,27 +62,25 @@ def read_dbc(path: Path) -> bytes:
     """
     try:
         data = read_bytes(path, MAX_BYTES)
-        decode_dbc(data)
     except FileError as error:
         raise CompileError(Place(str(path)), error.problem) from error
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise CompileError(
-            Place(str(path), line),
-            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
-            "save the file as UTF-8",
-        ) from None
+    _decoded(path, data)
     return data
 
 
-def load_dbc(path: Path, *, strict: bool = True) -> Dbc:
+def load_dbc(path: Path) -> Dbc:
     """A DBC file, in cantools' strict mode: no two signals overlap, and none is longer than its message.
 
     Raises:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
     """
+    return parse_dbc(path, read_dbc(path))
+
+
+def parse_dbc(path: Path, data: bytes, *, strict: bool = True) -> Dbc:
+    """The same of the bytes of a file. Raises CompileError as load_dbc() does."""
     place = Place(str(path))
-    content = decode_dbc(read_dbc(path))
+    content = _decoded(path, data)
     text = DbcText(str(path), content)
     try:
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.leaf_model import Declarations, read_model
+from canopy.compiler.leaf_model import Declarations, Leaf, read_model
 from canopy.compiler.port_types import Options
-from canopy.compiler.xml_reader import Element, read_xml
+from canopy.compiler.xml_reader import Element, parse_xml
+from canopy.files import FileError, read_bytes
 
 UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
@@ -24,12 +26,10 @@ class Documents:
     main: str = ""
     declarations: Declarations = field(default_factory=Declarations)
 
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name that no file can have
-        return False
+    @cached_property
+    def usable_leaves(self) -> dict[str, Leaf]:
+        """The leaves that a tree can use, by ID."""
+        return {name: leaf for name, leaf in self.declarations.leaves.items() if leaf.problem is None}
 
 
 class _Reader:
@@ -41,32 +41,41 @@ class _Reader:
     def read(self, path: Path) -> Element:
         """Reads a file and, depth first, what it includes. The files that are open are in `chain`."""
         top = self._read_root(path)
-        waiting = [(top, iter(top.children), path)]
+        waiting = [(iter(top.children), path)]
+        known = {path.resolve()}
+        chain = dict.fromkeys(known)
         while waiting:
-            _root, elements, file = waiting[-1]
+            elements, file = waiting[-1]
             element = next(elements, None)
             if element is None:
                 waiting.pop()
+                chain.popitem()
             elif element.tag == "include":
                 path = self._included(element, file)
                 target = path.resolve()
-                chain = [open_file for _, _, open_file in waiting]
-                if target in [open_file.resolve() for open_file in chain]:
-                    names = " -> ".join([*(open_file.name for open_file in chain), target.name])
+                if target in chain:
+                    names = " -> ".join(open_file.name for open_file in (*chain, target))
                     raise CompileError(element.place, f"files include each other in a loop: {names}")
-                if target not in [known.resolve() for known in self.documents.files]:
+                if target not in known:
                     inner = self._read_root(path, element)
-                    waiting.append((inner, iter(inner.children), path))
+                    waiting.append((iter(inner.children), path))
+                    known.add(target)
+                    chain[target] = None
             else:
                 self._take(element)
         return top
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
-        if included_by is not None and not _is_file(path):
+        try:
+            data = read_bytes(path)
+        except FileError as error:
+            if included_by is None:
+                raise CompileError(Place(str(path)), error.problem) from error
             place = included_by.attribute_place("path")
-            raise CompileError(place, f"the included file '{path}' is not there", "paths are relative to this file")
+            message = f"the included file '{path}' {'is not there' if error.missing else error.problem}"
+            raise CompileError(place, message, "paths are relative to this file") from error
         self.documents.files.append(path)
-        root = read_xml(path)
+        root = parse_xml(data, str(path))
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
             raise CompileError(
                 root.place,

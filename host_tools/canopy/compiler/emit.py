@@ -248,7 +248,7 @@ def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
 def render(application: Application) -> dict[str, bytes]:
     """File name -> content, the one that a build looks at last. The same input gives the same bytes."""
     bindings = application.table.bindings
-    texts = Texts(bindings.texts)
+    texts = Texts(bindings.texts or ("",))
     context = {
         "app": application,
         "table": application.table,

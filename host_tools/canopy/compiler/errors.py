@@ -42,10 +42,17 @@ class UnsupportedTypeError(CompileError):
     """A port has a type for which there is nothing in C. It matters only where a tree uses the port's node."""
 
 
+MOST_NAMES = 40
+LONGEST_NAME = 200  # looking for the nearest of two longer ones takes long
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
-    """A help text that names what `word` may have been meant to be: the nearest known name, else all of them."""
+    """A help text that names what `word` may have been meant to be: the nearest known name, else the first of them."""
     names = sorted(set(known))
-    close = difflib.get_close_matches(word, names, n=1)
+    close = None
+    if len(word) <= LONGEST_NAME:
+        close = difflib.get_close_matches(word, [name for name in names if len(name) <= LONGEST_NAME], n=1)
     if close:
         return f"did you mean '{close[0]}'?"
-    return f"known here: {', '.join(names)}" if names else "none is known here"
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"known here: {', '.join(names[:MOST_NAMES])}{more}" if names else "none is known here"

@@ -11,12 +11,12 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 
 COLUMNS = 120
 TOO_LONG = 5_000  # a statement that no reader would read on several lines, either
 
 _CONTINUED = 4
-_TRAILING = re.compile(r"(?P<code>.*\S) +(?P<comment>/\*(?:[^*]|\*(?!/))*\*/)")
 # What a line may end with (the two of ?: begin the next one instead), the loosest first.
 _LOOSEST_FIRST = (", ", " ? ", " : ", " || ", " && ", " | ", " + ", " - ", " * ")
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[(\[{]|[)\]}]| = |' + "|".join(map(re.escape, _LOOSEST_FIRST)))
@@ -126,25 +126,41 @@ def _with_comments(run: list[tuple[str, str]]) -> Iterator[str]:
 
     A comment that finds no room there goes above its line.
     """
-    while run:
-        column = max(len(code) for code, _ in run) + 1
-        long = next((i for i, (_, comment) in enumerate(run) if column + len(comment) > COLUMNS), len(run))
-        column = max((len(code) + 1 for code, _ in run[:long]), default=0)
-        for code, comment in run[:long]:
+    widest = list(accumulate((len(code) for code, _ in reversed(run)), max))  # of the last 1, 2, … lines
+    start = 0
+    while start < len(run):
+        column = widest[len(run) - start - 1] + 1
+        end = start
+        while end < len(run) and column + len(run[end][1]) <= COLUMNS:
+            end += 1
+        beside = run[start:end]
+        column = max((len(code) + 1 for code, _ in beside), default=0)
+        for code, comment in beside:
             yield f"{code.ljust(column)}{comment}"
-        if long < len(run):
-            code, comment = run[long]
+        start = end
+        if start < len(run):
+            code, comment = run[start]
             yield from _whole(_above(code, comment))
             yield from _whole(code)
-        run = run[long + 1 :]
+        start += 1
+
+
+def _trailing(line: str) -> tuple[str, str] | None:
+    """Code and the comment behind it; None when the line is not both."""
+    if not line.endswith("*/"):
+        return None
+    place = line.rfind("/*")  # in a comment there is none
+    code = line[:place].rstrip(" ")
+    alone = not code or code.lstrip().startswith(("/*", "*"))
+    return None if alone or line[place - 1] != " " else (code, line[place:])
 
 
 def _lines(lines: Iterable[str]) -> Iterator[str]:
     run: list[tuple[str, str]] = []
     for line in lines:
-        trailing = _TRAILING.fullmatch(line)
-        if trailing is not None and not trailing["code"].lstrip().startswith(("/*", "*")):
-            run.append((trailing["code"], trailing["comment"]))
+        trailing = _trailing(line)
+        if trailing is not None:
+            run.append(trailing)
             continue
         yield from _with_comments(run)
         run = []

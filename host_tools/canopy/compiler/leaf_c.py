@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from canopy.compiler.blackboard import Entry
 from canopy.compiler.bus_reader import Bus
@@ -11,7 +11,7 @@ from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.names import snake
 from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType
-from canopy.escape.c import emits_c
+from canopy.escape.c import emits_c, mark_c
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
 
@@ -89,7 +89,6 @@ def _spaced(c_type: str) -> str:
     return c_type if c_type.endswith("*") else f"{c_type} "
 
 
-@emits_c
 def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[tuple[str, str]]:
     """(declaration, comment) of the members of the ports struct that a port becomes."""
     notes = [port.description.rstrip(".") + "."] if port.description else []
@@ -99,11 +98,11 @@ def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[
         notes.insert(0, f"In steps of {plain(port.type.scale)}.")
     if not port.writes:
         c_type = f"const {port.type.c} *" if port.type.kind == "user" else port.type.c
-        return [(f"{_spaced(c_type)}{port.c_name};", " ".join(notes))]
+        return [(mark_c(f"{_spaced(c_type)}{port.c_name};"), " ".join(notes))]
     notes.append(f"Written with {leaf.c_name}_set_{port.c_name}().")
-    members = [(f"{_stored(port.type)} *{port.c_name};", " ".join(notes))]
+    members = [(mark_c(f"{_stored(port.type)} *{port.c_name};"), " ".join(notes))]
     if (leaf.id, port.name) in counted:
-        members.append((f"uint32_t *{port.c_name}_updates;", "Counts the writes, for nodes that wait for them."))
+        members.append((mark_c(f"uint32_t *{port.c_name}_updates;"), "Counts the writes, for nodes that wait for them."))
     return members
 
 
@@ -138,12 +137,11 @@ def writes_texts(leaf: Leaf) -> bool:
     return any(port.writes and port.type.holds_texts for port in leaf.ports)
 
 
-@emits_c
-def text_constants(leaf: Leaf, texts: Sequence[str]) -> list[tuple[str, int, str]]:
+def text_constants(leaf: Leaf, places: Mapping[str, int]) -> list[tuple[str, int, str]]:
     """(C name, place in the table, text) of what the leaf may write."""
     if not writes_texts(leaf):
         return []
-    return [(f"{leaf.c_name}_{snake(text)}".upper(), texts.index(text), text) for text in leaf.texts]
+    return [(f"{leaf.c_name}_{snake(text)}".upper(), places[text], text) for text in leaf.texts]
 
 
 def entry_note(entry: Entry) -> str:

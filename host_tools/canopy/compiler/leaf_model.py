@@ -23,7 +23,9 @@ a condition's threshold from chattering).
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from canopy.compiler.bounds import PORTS_MAX
@@ -72,7 +74,7 @@ class Port:
     direction: Literal["in", "out", "inout"] = "in"
     capacity: int = 0
 
-    @property
+    @cached_property
     def c_name(self) -> str:
         """The member's name in the ports struct."""
         return snake(self.name)
@@ -106,7 +108,7 @@ class Leaf:
     hysteresis: str = ""
     problem: UnsupportedTypeError | None = field(default=None, compare=False)
 
-    @property
+    @cached_property
     def c_name(self) -> str:
         """Stem of the C functions: `walk_home` of `WalkHome`."""
         return snake(self.id)
@@ -127,6 +129,8 @@ class Declarations:
     """What the models of all files declare: the user's nodes, and the ports of trees, by ID."""
 
     leaves: dict[str, Leaf] = field(default_factory=dict)
+    c_names: dict[str, Leaf] = field(default_factory=dict)
+    """The same leaves, by their C names."""
     subtrees: dict[str, tuple[Port, ...]] = field(default_factory=dict)
 
 
@@ -134,6 +138,7 @@ class Declarations:
 class _Draft:
     metadata: dict[str, tuple[str, Place]] = field(default_factory=dict)
     ports: list[Port] = field(default_factory=list)
+    c_names: set[str] = field(default_factory=set)
     problem: UnsupportedTypeError | None = None
 
 
@@ -182,9 +187,10 @@ def _words(draft: _Draft, key: str) -> tuple[str, ...]:
 def _texts(draft: _Draft, leaf_id: str) -> tuple[str, ...]:
     text, place = draft.metadata.get("texts", ("", Place("")))
     texts = tuple(part.strip() for part in text.split(";") if part.strip())
-    names = [snake(part) for part in texts]
-    for part, name in zip(texts, names, strict=True):
-        if not name.strip("_") or names.count(name) > 1:
+    names = Counter(map(snake, texts))
+    for part in texts:
+        name = snake(part)
+        if not name.strip("_") or names[name] > 1:
             raise CompileError(place, f"texts of '{leaf_id}': '{part}' gives no C name of its own, but '{name}'")
     return texts
 
@@ -210,9 +216,10 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
             except UnsupportedTypeError as error:
                 draft.problem = draft.problem or error
                 continue
-            if any(port.c_name == other.c_name for other in draft.ports):
+            if port.c_name in draft.c_names:
                 raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
             draft.ports.append(port)
+            draft.c_names.add(port.c_name)
             if len(draft.ports) > PORTS_MAX:
                 raise CompileError(child.place, f"'{leaf_id}' has more than {PORTS_MAX} ports")
         elif child.tag == "MetadataFields":
@@ -293,10 +300,10 @@ def read_model(model: Element, into: Declarations, options: Options, built_in: f
                 raise CompileError(element.place, f"'{node_id}' is the name of a built-in node", "choose another ID")
             continue
         leaf = _read_leaf(element, options)
-        same = [other for other in into.leaves.values() if other.id == leaf.id or other.c_name == leaf.c_name]
-        if same and (same[0] != leaf or leaf.id in seen):
+        same = into.c_names.setdefault(leaf.c_name, leaf)
+        if same is not leaf and (same != leaf or leaf.id in seen):
             raise CompileError(
-                leaf.place, f"'{leaf.id}' is declared again (or has the same C name)", f"first: {same[0].place}"
+                leaf.place, f"'{leaf.id}' is declared again (or has the same C name)", f"first: {same.place}"
             )
         seen.add(leaf.id)
         into.leaves.setdefault(leaf.id, leaf)

@@ -34,7 +34,9 @@ def dependencies(depfile: Path, target: Path, read: list[Path]) -> dict[Path, by
         raise CompileError(Place(str(depfile)), str(error), "rename it") from error
 
 
-def write_or_exit(folder: Path, files: Mapping[str, bytes], first: Mapping[Path, bytes] | None = None, new: tuple[Path, ...] = ()) -> None:
+def write_or_exit(
+    folder: Path, files: Mapping[str, bytes], first: Mapping[Path, bytes] | None = None, new: tuple[Path, ...] = ()
+) -> None:
     """Writes `files` into the folder, which is made, and before them `first`: all or none; else fail().
 
     `new`: those of `first` that must not be there yet.
@@ -46,7 +48,9 @@ def write_or_exit(folder: Path, files: Mapping[str, bytes], first: Mapping[Path,
         place = Place(str(error.filename or folder))
         if Path(place.file) not in new:
             fail(CompileError(place, f"cannot be written: {error.strerror}"))
-        fail(CompileError(place, "is there already, and is not overwritten", "name a new file, and copy what is missing"))
+        fail(
+            CompileError(place, "is there already, and is not overwritten", "name a new file, and copy what is missing")
+        )
     except OSError as error:
         fail(CompileError(Place(str(error.filename or folder)), f"cannot be written: {error.strerror}"))
     except FileError as error:

@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
-from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError
+from canopy.compiler.errors import LONGEST_NAME, CompileError, Place, UnsupportedTypeError
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.numbers import exact, plain
 from canopy.escape.c import emits_c, string
@@ -195,7 +195,7 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
             f"{where}: unsupported type '{name}'",
             f"give the C type of yours that stands for it: --type-map '{normal}=my_type_t'",
         )
-    close = difflib.get_close_matches(normal, [n for n in PORT_TYPES if n], n=1, cutoff=0.85)
+    close = difflib.get_close_matches(normal[:LONGEST_NAME], [n for n in PORT_TYPES if n], n=1, cutoff=0.85)
     if normal not in mapped.values() and close:
         raise UnsupportedTypeError(place, f"{where}: unsupported type '{name}'", f"did you mean '{close[0]}'?")
     if options.include is None:

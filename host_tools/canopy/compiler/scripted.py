@@ -52,7 +52,7 @@ class Context:
         target = scope.resolve(inner if inner is not None else text.strip(), place)
         if isinstance(target, SignalName):
             raise CompileError(place, f"{attribute}: '{target.text}' is a signal, and an entry is needed here")
-        target.uses.append(Use(kind, place, what, writes))
+        target.connect(Use(kind, place, what, writes))
         return target
 
 
@@ -175,7 +175,7 @@ def _loop(context: Context, element: Element, scope: Scope, xml_name: str) -> No
         script.queue = context.entry(element, "queue", scope, f"<{xml_name} queue>", writes=False, kind=ANY)
         return node
     script.state = context.board.make(f"next item at line {element.place.line}", scope.path, element.place)
-    script.state.uses.append(Use(PORT_TYPES["uint16_t"], element.place, f"<{xml_name}>", True))
+    script.state.connect(Use(PORT_TYPES["uint16_t"], element.place, f"<{xml_name}>", True))
     return node
 
 

@@ -12,6 +12,7 @@ from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.table import Table
 from canopy.escape.c import emits_c
 
+
 @emits_c
 def _body(leaf: Leaf, prototype: str) -> list[str]:
     """Statements that compile without a warning and do the least."""

@@ -7,7 +7,7 @@ A <SubTree> costs no node: the root of its tree stands in its place, with a scop
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
@@ -24,6 +24,7 @@ __all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree", "read_unu
 
 MAX_NODES = 65_534
 MAX_SUBTREE_DEPTH = 1_000
+MAX_PATH = 4_000
 
 # Attributes that any node may have and that change nothing in a tick.
 PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath")
@@ -77,7 +78,7 @@ class _Builder:
         self._models = documents.declarations
         self._built_in = built_in_types()
         self.context = Context(options, Blackboard())
-        self._count = 0
+        self.count = 0
         self.used: set[str] = set()
 
     def build(self, tree_id: str) -> Node:
@@ -114,11 +115,11 @@ class _Builder:
             entry = scope.resolve(port.name, port.place)
             if isinstance(entry, Entry):
                 entry.initial = port.default
-                entry.uses.append(Use(port.type, port.place, f"port '{port.name}' of the main tree", True))
+                entry.connect(Use(port.type, port.place, f"port '{port.name}' of the main tree", True))
 
     def _counted(self, node: Node) -> Node:
-        self._count += 1
-        if self._count > MAX_NODES:
+        self.count += 1
+        if self.count > MAX_NODES:
             raise CompileError(node.place, f"the tree has more than {MAX_NODES} nodes")
         return node
 
@@ -165,6 +166,8 @@ class _Builder:
         self.used.add(tree_id)
         name = outer.unique(element.attributes.get("name", tree_id))
         path = f"{outer.scope.path}/{name}".lstrip("/")
+        if len(path) > MAX_PATH:  # every node and entry below has it in its name
+            raise CompileError(element.place, f"the names of nested subtrees have more than {MAX_PATH} characters")
         autoremap = element.attributes.get("_autoremap", "false")
         if autoremap.lower() not in ("true", "false", "1", "0"):
             raise CompileError(
@@ -199,7 +202,7 @@ class _Builder:
                     scope.connect(port.name, port.default, port.place)
             target = scope.resolve(port.name, port.place)
             if isinstance(target, Entry):
-                target.uses.append(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
+                target.connect(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
 
     def _make(self, element: Element, instance: _Instance) -> Node:
         node_id = element.attributes.get("ID", "") if element.tag in EXPLICIT else element.tag
@@ -287,7 +290,7 @@ class _Builder:
             return Bound(port, place, text=text)
         target = scope.resolve(name, place)
         if isinstance(target, Entry):
-            target.uses.append(Use(port.type, place, f"port '{port.name}' of '{leaf.id}'", port.writes))
+            target.connect(Use(port.type, place, f"port '{port.name}' of '{leaf.id}'", port.writes))
         elif port.writes:
             raise CompileError(place, f"port '{port.name}' of '{leaf.id}' is written, and '{name}' is a signal")
         return Bound(port, place, target=target)
@@ -331,7 +334,7 @@ class _Builder:
         script.target = scope.resolve(inner, script.place())
         script.least = LEAST.get(name, -(2**31))
         if isinstance(script.target, Entry):
-            script.target.uses.append(Use(ANY, script.place(), f"<{element.tag} {name}>", False))
+            script.target.connect(Use(ANY, script.place(), f"<{element.tag} {name}>", False))
         return script
 
 
@@ -343,7 +346,9 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
     """
     options = options or Options()
     documents = read_documents(path, options, _built_in_names())
-    return _expand(path, documents, options, documents.main)
+    tree = _expand(path, documents, _Builder(documents, options), documents.main)
+    own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
+    return replace(tree, unused={name: element for name, element in own.items() if name not in tree.used})
 
 
 def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tuple[str, Tree | CompileError]]:
@@ -351,17 +356,24 @@ def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tupl
     documents = read_documents(path, options, _built_in_names())
     inner = {ref for element in tree.unused.values() for ref in _subtrees(element)}
     seen: set[str] = set()
+    nodes = 0
     # Those that no other one has come first; the rest is seen with them, but for trees that contain each other.
     for tree_id in sorted(tree.unused, key=lambda name: name in inner):
         if tree_id in seen:
             continue
+        if nodes > MAX_NODES:
+            message = f"the trees that are not used have more than {MAX_NODES} nodes; from here on none is looked at"
+            yield tree_id, CompileError(tree.unused[tree_id].place, message)
+            return
+        builder = _Builder(documents, options)
         try:
-            found = _expand(path, documents, options, tree_id)
+            found = _expand(path, documents, builder, tree_id)
         except CompileError as error:
             yield tree_id, error
-            continue
-        seen |= found.used
-        yield tree_id, found
+        else:
+            seen |= found.used
+            yield tree_id, found
+        nodes += builder.count
 
 
 def _subtrees(element: Element) -> Iterator[str]:
@@ -373,18 +385,15 @@ def _subtrees(element: Element) -> Iterator[str]:
             yield part.attributes.get("ID", "")
 
 
-def _expand(path: Path, documents: Documents, options: Options, tree_id: str) -> Tree:
-    builder = _Builder(documents, options)
+def _expand(path: Path, documents: Documents, builder: _Builder, tree_id: str) -> Tree:
     root = builder.build(tree_id)
-    own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
     return Tree(
         id=tree_id,
         path=path,
         root=root,
-        leaves={name: leaf for name, leaf in documents.declarations.leaves.items() if leaf.problem is None},
+        leaves=documents.usable_leaves,
         files=tuple(documents.files),
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
         used=frozenset(builder.used),
-        unused={name: element for name, element in own.items() if name not in builder.used},
     )

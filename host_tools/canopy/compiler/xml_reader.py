@@ -15,7 +15,6 @@ from xml.parsers import expat
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.files import FileError, read_bytes
 
-MAX_BYTES = 16 * 1024 * 1024
 MAX_DEPTH = 65_534
 
 
@@ -31,6 +30,8 @@ class Element:
     source: bytes = field(default=b"", repr=False)
     offset: int = 0
     _values: dict[bytes, tuple[int, int]] | None = field(default=None, repr=False)
+    _characters: dict[str, list[int]] = field(default_factory=dict, repr=False)
+    """Where each character of an attribute begins: scripts ask for many."""
 
     def attribute_place(self, name: str, index: int = 0) -> Place:
         """The place of character `index` of an attribute's value; the tag's place when the value cannot be found.
@@ -43,7 +44,10 @@ class Element:
         if not end:
             return self.place
         if index:
-            start += sum(map(len, _CHARACTER.findall(self.source[start:end])[:index]))
+            if name not in self._characters:
+                self._characters[name] = [match.start() for match in _CHARACTER.finditer(self.source, start, end)]
+            starts = self._characters[name]
+            start = starts[index] if index < len(starts) else end
         return self._place_of(start)
 
     def only(self, *known: str) -> None:
@@ -95,6 +99,7 @@ class _Builder:
         self._parser.CharacterDataHandler = self._text
         self._parser.StartDoctypeDeclHandler = self._doctype
         self._open: list[Element] = []
+        self._texts: list[list[str]] = []  # of the open elements, as expat gives them: line by line
         self._root: Element | None = None
         self._data = b""
 
@@ -110,13 +115,14 @@ class _Builder:
         if len(self._open) >= MAX_DEPTH:
             raise CompileError(element.place, f"elements are nested more than {MAX_DEPTH} deep")
         self._open.append(element)
+        self._texts.append([])
 
     def _end(self, _tag: str) -> None:
-        self._open.pop()
+        self._open.pop().text = "".join(self._texts.pop())
 
     def _text(self, data: str) -> None:
-        if self._open:
-            self._open[-1].text += data
+        if self._texts:
+            self._texts[-1].append(data)
 
     def _doctype(self, *_: object) -> None:
         raise CompileError(
@@ -136,6 +142,15 @@ class _Builder:
         return self._root
 
 
+def parse_xml(data: bytes, file: str) -> Element:
+    """The root element of a file's bytes.
+
+    Raises:
+        CompileError: not well-formed XML without a DOCTYPE.
+    """
+    return _Builder(file).parse(data)
+
+
 def read_xml(path: Path) -> Element:
     """The root element of the file.
 
@@ -143,7 +158,7 @@ def read_xml(path: Path) -> Element:
         CompileError: the file cannot be read, is larger than 16 MiB, or is not well-formed XML without a DOCTYPE.
     """
     try:
-        data = read_bytes(path, MAX_BYTES)
+        data = read_bytes(path)
     except FileError as error:
         raise CompileError(Place(str(path)), error.problem) from error
-    return _Builder(str(path)).parse(data)
+    return parse_xml(data, str(path))

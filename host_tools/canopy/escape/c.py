@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Text in C. What is not marked as C may stand in comments, where it is escaped, and as a word; else it is refused.
 
-The mark is the type `Code`. It is given by what makes C of checked parts: string(), header(), mark_c(), and the functions
+The mark is the type `Code`. It is given by what makes C of checked parts: string(), header(), mark_c(), and functions
 under @emits_c. tests/integration/test_escape.py has the list of them; a new one is reviewed there.
 """
 
@@ -79,7 +79,9 @@ def in_comment(value: object) -> Code:
     text = text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     text = _LAST_BACKSLASH.sub(r"\\x5c", text)
     # Nor together with what stands beside it.
-    return Code(f"{' ' if text[:1] in ('/', '*') else ''}{text}{' ' if text[-1:] in ('/', '*') else ''}" if text else "")
+    return Code(
+        f"{' ' if text[:1] in ('/', '*') else ''}{text}{' ' if text[-1:] in ('/', '*') else ''}" if text else ""
+    )
 
 
 def string(text: str) -> Code:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import click
 from rich.text import Text
@@ -34,8 +35,7 @@ def echo(*parts: str, err: bool = False, nl: bool = True) -> None:
 
 def echo_lines(text: str, *, err: bool = False) -> None:
     """Prints a text of several lines, whose line breaks are ours."""
-    for line in text.removesuffix("\n").split("\n"):
-        echo(line, err=err)
+    echo(Styled(visible(text.removesuffix("\n"), keep="\n")), err=err)
 
 
 def styled(*parts: str | tuple[str, str], style: str = "") -> Text:
@@ -45,10 +45,25 @@ def styled(*parts: str | tuple[str, str], style: str = "") -> Text:
 
 
 @contextmanager
-def clean_usage_errors() -> Iterator[None]:
-    """Around click's reading of a command line: what it says of an argument shows the argument harmless."""
+def _clean_usage_errors() -> Iterator[None]:
     try:
         yield
     except click.ClickException as error:
-        error.message = visible(error.message, keep="\n")
+        vars(error)["message"] = visible(error.message)  # "final" to type checkers
         raise
+
+
+class CleanCommand(click.Command):
+    """A command, or with click.Group a group, whose usage errors show the command line's words harmless."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """As click's."""
+        with _clean_usage_errors():
+            return super().make_context(info_name, args, parent, **extra)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """As click's."""
+        with _clean_usage_errors():
+            return super().invoke(ctx)

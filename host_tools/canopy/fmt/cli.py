@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import tempfile
 from pathlib import Path
 
 import click
 
 from canopy.compiler.errors import CompileError, Place
+from canopy.escape.terminal import echo, echo_lines
+from canopy.files import LARGEST, FileError, read_bytes, write_files
 from canopy.fmt.document import read_document
 from canopy.fmt.writer import write_document
 
@@ -23,30 +23,32 @@ def format_bytes(data: bytes, file: str) -> bytes:
     return write_document(read_document(data, file)).encode()
 
 
-def _replace(path: Path, data: bytes) -> None:
-    """Writes the whole file or nothing; keeps its permissions, and follows a link to it."""
-    target = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(temporary, target.stat().st_mode & 0o7777)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
-
-
 def _format_file(path: Path, check: bool) -> bool:
     """Formats a file in place, unless `check`. Was it not in canonical form?"""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
         formatted = format_bytes(data, str(path))
         if formatted != data and not check:
-            _replace(path, formatted)
+            target = path.resolve()  # a link to a file stays one
+            write_files({target: formatted}, mode=target.stat().st_mode & 0o7777)
+    except FileError as error:
+        raise CompileError(Place(str(path)), error.problem) from error
     except OSError as error:
         raise CompileError(Place(str(path)), f"cannot be read or written: {error.strerror}") from error
     return formatted != data
+
+
+def _read_input() -> bytes:
+    """Standard input, and no more of it than of a file."""
+    return sys.stdin.buffer.read(LARGEST + 1)
+
+
+def _print(formatted: bytes) -> None:
+    """Bytes for a pipe; a terminal does not get a comment's control characters."""
+    if sys.stdout.isatty():
+        echo_lines(formatted.decode())
+    else:
+        sys.stdout.buffer.write(formatted)
 
 
 @click.command()
@@ -69,21 +71,21 @@ def command(files: tuple[str, ...], check: bool) -> None:
     for name in files:
         try:
             if name == "-":
-                data = sys.stdin.buffer.read()
+                data = _read_input()
                 formatted = format_bytes(data, "<stdin>")
                 differs = formatted != data
                 if not check:
-                    sys.stdout.buffer.write(formatted)
+                    _print(formatted)
                     continue
             else:
                 differs = _format_file(Path(name), check)
         except CompileError as error:
-            click.echo(str(error), err=True)
+            echo_lines(str(error), err=True)
             unreadable = True
             continue
         if differs:
             changed = True
-            click.echo(f"{name}: {'not in canonical form' if check else 'formatted'}", err=check)
+            echo(f"{name}: {'not in canonical form' if check else 'formatted'}", err=check)
     if unreadable:
         sys.exit(INPUT_ERROR)
     sys.exit(WOULD_CHANGE if check and changed else 0)

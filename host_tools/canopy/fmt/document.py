@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.xml_reader import MAX_BYTES, unreadable_encoding
+from canopy.compiler.xml_reader import unreadable_encoding
+from canopy.files import LARGEST
 
 MAX_DEPTH = 5_000
 
@@ -48,13 +49,15 @@ class Document:
 
 
 class _Reader:
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, size: int) -> None:
         self.document = Document()
         self._file = file
         self._open: list[list[Content]] = [self.document.content]
         self._cdata = False
         self.parser = expat.ParserCreate()
         self.parser.ordered_attributes = True
+        self.parser.buffer_size = max(size, 1)  # of bytes: so a text comes whole, and not line by line
+        self.parser.buffer_text = True
         self.parser.XmlDeclHandler = self._declaration
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.StartElementHandler = self._start
@@ -114,9 +117,9 @@ def read_document(data: bytes, file: str) -> Document:
     Raises:
         CompileError: not well-formed XML, a DOCTYPE, too large, or nested too deep to be indented.
     """
-    if len(data) > MAX_BYTES:
-        raise CompileError(Place(file), f"the file has {len(data)} bytes; at most {MAX_BYTES} are read")
-    reader = _Reader(file)
+    if len(data) > LARGEST:
+        raise CompileError(Place(file), f"the file has {len(data)} bytes; at most {LARGEST} are read")
+    reader = _Reader(file, len(data))
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:

@@ -9,6 +9,8 @@ newline at the end. A loop, not recursion: trees may be as deep as they are larg
 
 from __future__ import annotations
 
+from unicodedata import category
+
 from canopy.fmt.document import Content, Document, Element, Text
 
 WIDTH = 120
@@ -20,12 +22,19 @@ _IN_ATTRIBUTE = str.maketrans(
 )
 
 
+def _references(text: str) -> str:
+    """Characters that one does not see, as references: `&#x202e;` turns nothing around in an editor."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" or category(c) == "Zs" else f"&#x{ord(c):x};" for c in text)
+
+
 def _text(text: Text) -> str:
-    return f"<![CDATA[{text.data}]]>" if text.cdata else text.data.translate(_IN_TEXT)
+    return f"<![CDATA[{text.data}]]>" if text.cdata else _references(text.data.translate(_IN_TEXT))
 
 
 def _attributes(element: Element) -> list[str]:
-    return [f'{name}="{value.translate(_IN_ATTRIBUTE)}"' for name, value in element.attributes]
+    return [f'{name}="{_references(value.translate(_IN_ATTRIBUTE))}"' for name, value in element.attributes]
 
 
 def _tag(element: Element, indent: str, end: str) -> str:

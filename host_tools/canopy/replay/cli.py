@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -11,6 +10,8 @@ from pathlib import Path
 
 import click
 
+from canopy.escape.json_text import dumps
+from canopy.escape.terminal import echo
 from canopy.model import Model, ModelError, load_model
 from canopy.replay.compare import Comparison, Result
 from canopy.replay.inputs import Inputs
@@ -111,20 +112,18 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
     result = replayed.result
     name = model.application
     if replayed.runs > 1 and options.run is None:
-        click.echo(
-            f"{name}: {log} has {replayed.runs} runs of the controller; this is the first, --run chooses", err=True
-        )
+        echo(f"{name}: {log} has {replayed.runs} runs of the controller; this is the first, --run chooses", err=True)
     if not result.differences:
-        click.echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal")
+        echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal")
         return
     for difference in result.differences[:_SHOWN]:
-        click.echo(f"{name}: {difference.text()}")
+        echo(f"{name}: {difference.text()}")
     if len(result.differences) > _SHOWN:
-        click.echo(f"{name}: and {len(result.differences) - _SHOWN} more in this tick (--json has all)")
-    click.echo(f"{name}: {result.ticks} ticks are equal, then the replay differs")
+        echo(f"{name}: and {len(result.differences) - _SHOWN} more in this tick (--json has all)")
+    echo(f"{name}: {result.ticks} ticks are equal, then the replay differs")
     record = options.keep or "run.replay"
     keep = "" if options.keep else f"with --keep {record}: "
-    click.echo(
+    echo(
         f"  {keep}gdb --args {options.program} --replay {record}, and break there `if loop.ticks == {result.ticks}`",
         err=True,
     )
@@ -132,7 +131,7 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
 
 def _as_json(log: Path, model: Model, replayed: Replayed) -> str:
     result = replayed.result
-    return json.dumps(
+    return dumps(
         {
             "log": str(log),
             "application": model.application,
@@ -192,11 +191,12 @@ def command(
         model = load_model(model_path)
         replayed = replay(log, model, options)
     except (LogError, ModelError, ProgramError, OSError) as error:
-        click.echo(json.dumps({"log": str(log), "equal": False, "error": str(error)}) if as_json else "", nl=as_json)
-        click.echo(f"canopy replay: {error}", err=True)
+        if as_json:
+            echo(dumps({"log": str(log), "equal": False, "error": str(error)}))
+        echo(f"canopy replay: {error}", err=True)
         sys.exit(1)
     if as_json:
-        click.echo(_as_json(log, model, replayed))
+        echo(_as_json(log, model, replayed))
     else:
         _show(log, model, options, replayed)
     sys.exit(1 if replayed.result.differences else 0)

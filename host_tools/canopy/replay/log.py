@@ -16,6 +16,7 @@ from pathlib import Path
 import can
 from cantools.database.can import Message as DbcMessage
 
+from canopy.files import FileError, check_file
 from canopy.model import Model, ModelError
 from canopy.signals import load_database
 from canopy.trace import mismatch
@@ -270,8 +271,11 @@ def read_recording(path: Path, model: Model, channel: str | None = None) -> Reco
     reader = _Reader(Bus(model), path)
     channels: set[str] = set()
     try:
+        check_file(path)
         with can.LogReader(path) as log:
             _take_all(reader, log, channel, channels)
+    except FileError as error:
+        raise LogError(str(error)) from error
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (LogError, ModelError):

@@ -3,32 +3,33 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from canopy.compiler.cli import main_tree_option, package_option, read_packages
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.output import fail
 from canopy.compiler.port_types import ANY_TYPE
 from canopy.compiler.tree_reader import read_tree
+from canopy.escape.terminal import echo_lines
+from canopy.files import FileError, write_files
 from canopy.show.dot import dot
 from canopy.show.svg import svg
 from canopy.show.terminal import print_tree
 
-INPUT_ERROR = 2
-
 
 def _write(target: str, text: str) -> None:
     if target == "-":
-        click.echo(text, nl=False)
+        echo_lines(text)
         return
     try:
-        Path(target).write_text(text, encoding="utf-8")
+        write_files({Path(target): text.encode()})
     except OSError as error:
-        click.echo(f"{target}: error: cannot be written: {error.strerror}", err=True)
-        sys.exit(INPUT_ERROR)
+        fail(CompileError(Place(target), f"cannot be written: {error.strerror}"))
+    except FileError as error:
+        fail(CompileError(Place(target), f"cannot be written: {error.problem}"))
 
 
 @click.command()
@@ -58,8 +59,7 @@ def command(
     try:
         checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages), main_tree=main_tree))
     except CompileError as error:
-        click.echo(str(error), err=True)
-        sys.exit(INPUT_ERROR)
+        fail(error)
     if svg_file is not None:
         _write(svg_file, svg(checked))
     if dot_file is not None:

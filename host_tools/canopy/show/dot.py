@@ -3,23 +3,18 @@
 
 from __future__ import annotations
 
-import json
-
 from canopy.compiler.tree_reader import Tree
+from canopy.escape.dot import quoted
 from canopy.show.order import in_order
 from canopy.show.symbols import look
 
 _SHAPES = {"box": "box", "oval": "ellipse", "diamond": "box"}
 
 
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
 def dot(tree: Tree) -> str:
     """The graph; ordering=out keeps the children in their order."""
     lines = [
-        f"digraph {_quoted(tree.id)} {{",
+        f"digraph {quoted(tree.id)} {{",
         '  graph [ordering=out, nodesep=0.2, ranksep=0.4, splines=ortho, fontname="sans-serif"];',
         '  node [style=filled, fontname="sans-serif", fontsize=11, margin="0.08,0.05"];',
         '  edge [arrowhead=none, color="#555555"];',
@@ -28,10 +23,10 @@ def dot(tree: Tree) -> str:
     for number, (node, parent, _) in enumerate(in_order(tree.root)):
         numbers[id(node)] = number
         shown = look(node)
-        text = "\n".join(part for part in (shown.sign, shown.text) if part)
+        text = quoted(*(part for part in (shown.sign, shown.text) if part))
         style = 'style="filled,rounded", ' if shown.shape == "diamond" else ""
         lines.append(
-            f"  n{number} [label={_quoted(text)}, shape={_SHAPES[shown.shape]}, {style}"
+            f"  n{number} [label={text}, shape={_SHAPES[shown.shape]}, {style}"
             f'fillcolor="{shown.fill}", color="{shown.line}"];'
         )
         if parent is not None:

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import textwrap
-from xml.sax.saxutils import escape
 
 from canopy.compiler.tree_reader import Tree
+from canopy.escape import markup
 from canopy.show.layout import Box, place
 from canopy.show.order import in_order
 from canopy.show.symbols import Look, look
@@ -69,11 +69,11 @@ def _words(box: Box, shown: Look) -> list[str]:
         size = _SIGN_FONT if len(shown.sign) <= 3 else _FONT
         parts.append(
             f'<text x="{box.x:.1f}" y="{box.y + 22:.1f}" font-size="{size}" font-weight="bold" fill="{shown.line}">'
-            f"{escape(shown.sign)}</text>"
+            f"{markup.text(shown.sign)}</text>"
         )
         y = box.y + 39
     for number, line in enumerate(lines):
-        parts.append(f'<text x="{box.x:.1f}" y="{y + number * _LINE:.1f}">{escape(line)}</text>')
+        parts.append(f'<text x="{box.x:.1f}" y="{y + number * _LINE:.1f}">{markup.text(line)}</text>')
     return parts
 
 
@@ -96,7 +96,7 @@ def svg(tree: Tree) -> str:
     )
     parts = [
         head,
-        f"<title>{escape(tree.id)}</title>",
+        f"<title>{markup.text(tree.id)}</title>",
         f'<rect x="{-_MARGIN:.0f}" y="{-_MARGIN:.0f}" width="{size[0]}" height="{size[1]}" fill="#ffffff"/>',
         '<g fill="none" stroke="#555555" stroke-width="1.3">',
     ]
@@ -110,5 +110,5 @@ def svg(tree: Tree) -> str:
         kind = box.node.leaf.id if box.node.leaf is not None else box.node.type.name
         about = f"{kind} '{box.node.name}', line {box.node.place.line}"
         shown = look(box.node)
-        parts += ["<g>", f"<title>{escape(about)}</title>", _shape(box, shown), *_words(box, shown), "</g>"]
+        parts += ["<g>", f"<title>{markup.text(about)}</title>", _shape(box, shown), *_words(box, shown), "</g>"]
     return "\n".join([*parts, "</svg>"]) + "\n"

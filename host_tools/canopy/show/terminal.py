@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 from canopy.compiler.tree_reader import Tree
+from canopy.escape.terminal import styled
 from canopy.show.order import in_order
 from canopy.show.symbols import look
 
@@ -20,7 +21,7 @@ def _label(node_text: str, shape: str, leaf: bool) -> str:
 def lines(tree: Tree, *, ascii_only: bool = False) -> list[Text]:
     """One line a node, under the tree's ID. Not rich's Tree: that one recurses."""
     tee, last_tee, bar = ("|-- ", "`-- ", "|   ") if ascii_only else ("├── ", "└── ", "│   ")
-    result = [Text(tree.id, style="bold")]
+    result = [styled(tree.id, style="bold")]
     prefixes = {id(tree.root): ""}
     for node, parent, _ in in_order(tree.root):
         before = ""
@@ -31,7 +32,7 @@ def lines(tree: Tree, *, ascii_only: bool = False) -> list[Text]:
         shown = look(node, ascii_only=ascii_only)
         text = _label(shown.text, shown.shape, leaf=not shown.sign)
         label = f"{shown.sign} {text}".strip()
-        result.append(Text.assemble((before, "bright_black"), (label, shown.style)))
+        result.append(styled((before, "bright_black"), (label, shown.style)))
     return result
 
 

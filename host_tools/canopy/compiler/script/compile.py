@@ -47,16 +47,20 @@ FAULTS = "&app->entries.script_faults"
 class UntypedError(Exception):
     """An entry whose type is not known yet."""
 
+    def __init__(self, entry: Entry) -> None:
+        super().__init__(entry.name)
+        self.entry = entry
+
 
 class Texts:
     """The application's table of texts: each one once, in the order in which they were first met."""
 
-    def __init__(self, known: Iterable[str] = ()) -> None:
-        self._places = {text: place for place, text in enumerate(known)} or {"": 0}
+    def __init__(self, texts: Iterable[str] = ("",)) -> None:
+        self._places = {text: place for place, text in enumerate(texts)}
 
     @property
     def all(self) -> tuple[str, ...]:
-        """The table."""
+        """The texts, each at its place."""
         return tuple(self._places)
 
     def index(self, text: str) -> int:
@@ -173,7 +177,7 @@ class Compiler:
         if entry.is_constant:
             value = guess(entry.initial or "")
             return TextConst(entry.initial or "") if entry.type.kind == "text" else value
-        if entry.initial is None and not any(use.writes for use in entry.uses):
+        if entry.initial is None and not entry.is_written:
             raise ScriptError(index, f"nothing writes entry '{entry.name}'", self.scope.help_for(entry.name))
         return self.stored(entry, index)
 
@@ -181,7 +185,7 @@ class Compiler:
         """The value of the entry's member."""
         c, kind = f"app->entries.{entry.c_name}", entry.type
         if kind.kind == "any":
-            raise UntypedError(entry.name)
+            raise UntypedError(entry)
         if kind.kind == "user":
             raise ScriptError(index, f"'{entry.name}' is of your type {kind.c}: scripts cannot read it", "write a leaf")
         if kind.kind == "text":
@@ -285,7 +289,7 @@ class Compiler:
                 expression.operator[0], self.stored(target, expression.index), value, expression.index
             )
         if target.type.kind == "any":
-            raise UntypedError(target.name)
+            raise UntypedError(target)
         return self.store(target, self.storing.convert(value, target.type, expression.value.index))
 
     @staticmethod
