@@ -84,7 +84,9 @@ class BusMaker:
             lines += self._signal(name, identifier, f"S{number}", at, length, receiver)
             (self.outputs if sent else self.inputs).append(f"{name}.S{number}")
             at += length
-        self._messages += f"BO_ {hostile.integer(identifier, 0.01)} {name}: {hostile.integer(8, 0.02)} {sender}\n{lines}\n"
+        self._messages += (
+            f"BO_ {hostile.integer(identifier, 0.01)} {name}: {hostile.integer(8, 0.02)} {sender}\n{lines}\n"
+        )
         if rng.random() < 0.15:
             faulty = rng.random() < 0.6
             factor = rng.choice(CYCLES_OF_A_FAULT) if faulty else rng.randint(1, 4)

@@ -15,7 +15,6 @@ from canopy.compiler.errors import CompileError
 from canopy.compiler.leaf_c import prototypes
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.port_types import Options
-
 from fuzz.generated.bus import BusMaker
 from fuzz.generated.hostile import Hostile
 from fuzz.generated.tree import TreeMaker
@@ -23,7 +22,7 @@ from fuzz.generated.tree import TreeMaker
 
 @dataclass
 class Case:
-    """What became of a case. `sources` is empty when the compiler has refused it; `fault` says what is wrong with it."""
+    """What became of a case. `sources` is empty when the compiler has refused it; `fault` says what is wrong."""
 
     seed: int
     number: int
@@ -37,7 +36,7 @@ class Case:
 def make_case(seed: int, number: int, top: Path) -> Case:
     """Writes the input files of a case into a folder of its own, and compiles them to C there."""
     rng = random.Random(f"{seed}:{number}")
-    hostile = Hostile(rng, number)
+    hostile = Hostile(rng)
     case = Case(seed, number, top / f"case_{number}", f"case_{number}")
     case.folder.mkdir(parents=True, exist_ok=True)
     period_ms = rng.choice([1, 10, 100])

@@ -37,6 +37,12 @@ void fuzz_read_text(const char *text)
     }
 }
 
+void canopy_fuzz_injected(void)
+{
+    fprintf(stderr, "CANOPY-FUZZ-INJECTED: a text of a file has become code\n");
+    abort();
+}
+
 /** The bus: as many frames as are left in this tick, most of them with an id and a form that the application knows. */
 typedef struct {
     const canopy_app_t *app;

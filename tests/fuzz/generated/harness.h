@@ -20,4 +20,7 @@ void fuzz_read_text(const char *text);
 /** Runs an application for some ticks with random frames. Aborts when a table says what cannot be. */
 void fuzz_run(const canopy_app_t *app, uint64_t seed);
 
+/** What code in the texts of a file calls: says so, and aborts. */
+void canopy_fuzz_injected(void);
+
 #endif

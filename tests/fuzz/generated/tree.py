@@ -13,7 +13,18 @@ _CONTROLS = ["Sequence", "ReactiveSequence", "Fallback", "ReactiveFallback", "As
 _PLAIN = ["Inverter", "ForceSuccess", "ForceFailure", "KeepRunningUntilFailure", "RunOnce"]
 _NUMBERED = {"Repeat": "num_cycles", "RetryUntilSuccessful": "num_attempts", "Delay": "delay_msec", "Timeout": "msec"}
 _THRESHOLDS = {"Parallel": "success_count", "ParallelAll": "max_failures", "ReactiveParallel": "success_count"}
-_TYPES = ["int8_t", "uint8_t", "int16_t", "int32_t", "uint32_t", "int64_t", "uint64_t", "bool", "duration", "int16_t*0.01"]
+_TYPES = [
+    "int8_t",
+    "uint8_t",
+    "int16_t",
+    "int32_t",
+    "uint32_t",
+    "int64_t",
+    "uint64_t",
+    "bool",
+    "duration",
+    "int16_t*0.01",
+]
 _TEXT_TYPES = ["std::string"]
 _FLOAT_TYPES = ["float", "double"]
 _ENTRIES = ["alpha", "beta", "gamma"]
@@ -157,9 +168,9 @@ class TreeMaker:
         return f"<{tag}{_attributes(**own, **self._common())}/>"
 
     def _use(self, _depth: int) -> str:
-        name, ports, _ = self._rng.choice(self._leaves)
+        name, ports, model = self._rng.choice(self._leaves)
         given = {port: self._literal(port_type) for port, port_type in ports}
-        tag = "Condition" if "<Condition" in self._leaves[[leaf[0] for leaf in self._leaves].index(name)][2] else "Action"
+        tag = "Condition" if model.startswith("<Condition") else "Action"
         return f"<{tag}{_attributes(ID=name, **given, **self._common())}/>"
 
     def _script(self, _depth: int) -> str:

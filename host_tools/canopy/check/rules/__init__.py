@@ -7,9 +7,9 @@ from canopy.check.registry import RULES, Rule
 
 # The order of the table.
 # isort: off
-from canopy.check.rules import reach, parallel, reactive, guards, outcomes, declarations
+from canopy.check.rules import reach, parallel, reactive, guards, outcomes, declarations, bus
 
-__all__ = ["all_rules", "declarations", "guards", "outcomes", "parallel", "reach", "reactive", "table"]
+__all__ = ["all_rules", "bus", "declarations", "guards", "outcomes", "parallel", "reach", "reactive", "table"]
 
 
 def all_rules() -> dict[str, Rule]:
