@@ -47,7 +47,7 @@ CASES = [
     ("swapped-range", "(0.1,0) [0|6553.5]", "(0.1,0) [6553.5|0]", "signal 'Speed.Value' has the range [6553.5|0]"),
     ("swapped-range", "[-128|127]", "[5|5]", "signal 'Torque.Torque' has the range [5"),
     ("never-stale", '"GenMsgCycleTime" 100;', '"GenMsgCycleTime" 0;', "input 'Speed' never gets stale"),
-    ("short-timeout", "BO_ 2 8;", 'BO_ 2 8;\nBA_ "GenMsgTimeoutTime" BO_ 2 50;', "has a timeout of 50 ms, and the cycle"),
+    ("short-timeout", "BO_ 2 8;", 'BO_ 2 8;\nBA_ "GenMsgTimeoutTime" BO_ 2 50;', "has a timeout of 50 ms"),
     ("shared-data-id", "BO_ 2 8;", "BO_ 2 7;", "messages 'Speed' and 'Torque' have the same E2EDataId 7"),
     ("narrow-range", "[0|4294967295]", "[0|100]", "signal 'Speed.Wide' takes 101 of the 4294967296 values"),
     ("narrow-range", "[-128|127]", "[0|255]", "its range is one of an unsigned signal"),
