@@ -93,11 +93,12 @@ test-asan:
 	ctest --preset asan
 	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang" tests/integration tests/differential
 
-fuzz: ## libFuzzer on tables, images, states, frames and traces, FUZZ_SECONDS=60 in all
+fuzz: ## libFuzzer on tables, images, states, frames and traces; then hostile files to C to the machine: FUZZ_SECONDS=60 each
 	$(SETUP)/ensure-packages fuzz
 	$(SETUP)/make-venv can,test
 	$(call BUILD,fuzz)
 	$(PYTHON) tests/fuzz/run.py build/fuzz $(FUZZ_SECONDS)
+	PYTHONPATH=tests $(PYTHON) -m fuzz.generated --seconds $(FUZZ_SECONDS) --seed $${CANOPY_SEED:-$$(date +%s)} --keep build/fuzz/found/generated
 
 proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any input (installs 1.2 GB)
 	$(SETUP)/ensure-packages proof

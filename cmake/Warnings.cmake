@@ -3,5 +3,5 @@
 add_library(canopy_warnings INTERFACE)
 target_compile_options(canopy_warnings INTERFACE
     -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wswitch-enum -Wdouble-promotion -Wcast-align
-    -Wmissing-prototypes -Wvla
+    -Wmissing-prototypes -Wvla -Wtype-limits -Werror=overflow
     $<$<BOOL:${CANOPY_WERROR}>:-Werror>)

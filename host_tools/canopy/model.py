@@ -26,6 +26,9 @@ TRACE_MESSAGES = (
     "CanopyHealth",
     "CanopyModel",
 )
+PERIOD_US_MAX = 3_600_000_000
+ID_MAX = 2**29 - 1
+LINE_MAX = 2**31 - 1
 
 T = TypeVar("T")
 
@@ -109,9 +112,7 @@ class _Reader:
             raise self._error("format", f"is {data['format']}, these tools read {FORMAT}: build the application again")
         tree = self._get(data, "", "tree", dict)
         bus = self._get(data, "", "bus", dict)
-        period_us = self._get(data, "", "period_us", int)
-        if period_us <= 0:
-            raise self._error("period_us", f"is {period_us}, must be above 0")
+        period_us = self._number(data, "", "period_us", 1, PERIOD_US_MAX)
         return Model(
             path=self._path,
             application=self._get(data, "", "application", str),
@@ -163,7 +164,7 @@ class _Reader:
             type=self._get(data, place, "type", str),
             category=self._get(data, place, "category", str),
             name=self._get(data, place, "name", str),
-            line=self._get(data, place, "line", int),
+            line=self._number(data, place, "line", 0, LINE_MAX),
         )
         if node.category not in CATEGORIES:
             raise self._error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
@@ -172,7 +173,7 @@ class _Reader:
     def _trace(self, data: dict[str, Any]) -> dict[str, int]:
         if "CanopyTick" not in data:
             raise self._error("trace", "has no CanopyTick: the DBC has no trace messages, so nothing can be watched")
-        trace = {name: self._get(data, "trace.", name, int) for name in TRACE_MESSAGES if name in data}
+        trace = {name: self._number(data, "trace.", name, 0, ID_MAX) for name in TRACE_MESSAGES if name in data}
         if len(set(trace.values())) != len(trace):
             raise self._error("trace", "gives two messages the same id")
         return trace
@@ -197,6 +198,12 @@ class _Reader:
             raise self._error(f"{where}{key}", "is missing")
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
             raise self._error(f"{where}{key}", f"is {value!r}, must be of type {kind.__name__}")
+        return value
+
+    def _number(self, data: dict[str, Any], where: str, key: str, low: int, high: int) -> int:
+        value = self._get(data, where, key, int)
+        if not low <= value <= high:
+            raise self._error(f"{where}{key}", f"is {str(value)[:30]}, must be {low} to {high}")
         return value
 
     def _error(self, place: str, text: str) -> ModelError:

@@ -7,13 +7,13 @@ import hashlib
 from dataclasses import dataclass
 from decimal import Decimal
 
-import cantools.database
 from cantools.database.can import Database
 from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
 from cantools.database.errors import DecodeError
 
-from canopy.compiler.dbc_file import decode_dbc
+from canopy.compiler.dbc_file import check_timing, parse_dbc
+from canopy.compiler.errors import CompileError
 from canopy.files import FileError, read_bytes
 from canopy.model import Model, ModelError
 
@@ -117,6 +117,7 @@ def load_database(model: Model) -> Database:
     Raises:
         ModelError: It cannot be read.
     """
+    used = {*model.receive, *model.send}
     try:
         data = read_bytes(model.dbc)
     except FileError as error:
@@ -124,12 +125,13 @@ def load_database(model: Model) -> Database:
     if model.dbc_hash not in (None, hashlib.sha256(data).hexdigest()[:16]):
         raise ModelError(f"{model.dbc}: is not the DBC that {model.path.name} was written with: build again")
     try:
-        database = cantools.database.load_string(decode_dbc(data), database_format="dbc", strict=False)
-    except Exception as error:
-        # cantools lets the exceptions of several parsers through.
-        raise ModelError(f"{model.dbc}: is no DBC that cantools can read: {error}") from error
-    if not isinstance(database, Database):
-        raise ModelError(f"{model.dbc}: is no CAN database")
+        dbc = parse_dbc(model.dbc, data, strict=False)
+        for message in dbc.database.messages:
+            if message.name in used:
+                check_timing(dbc, message)
+    except CompileError as error:
+        raise ModelError(f"{error.place}: {error.message}") from error
+    database: Database = dbc.database
     return database
 
 

@@ -15,8 +15,9 @@ from typing import Any
 import can
 from cantools.database.can import Database, Message, Signal
 
+from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
 from canopy.compiler.dbc_file import load_dbc
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.plant import PostureMode, PowerMode
 
@@ -39,14 +40,27 @@ class FrameRefusedError(Exception):
         self.reason = reason
 
 
+_LIMITS = {
+    "GenMsgCycleTime": TIME_MS,
+    "GenMsgTimeoutTime": TIME_MS,
+    "E2EDataId": DATA_ID,
+    "GenSigInactiveValue": RAW,
+}
+
+
 def _attribute(database: Database, owner: Message | Signal, name: str, otherwise: int) -> int:
     """An integer attribute of a message or signal, else its default in the DBC, else `otherwise`."""
+    value = None
     if owner.dbc is not None and name in owner.dbc.attributes:
-        return int(owner.dbc.attributes[name].value)
-    definition = database.dbc.attribute_definitions.get(name) if database.dbc is not None else None
-    if definition is None or definition.default_value is None:
+        value = owner.dbc.attributes[name].value
+    elif database.dbc is not None and name in database.dbc.attribute_definitions:
+        value = database.dbc.attribute_definitions[name].default_value
+    if value is None:
         return otherwise
-    return int(definition.default_value)
+    try:
+        return whole(value, _LIMITS[name], f"{name} of {owner.name}", Place(""))
+    except CompileError as error:
+        raise DescriptionError(error.message) from None
 
 
 def _exact(number: float | None) -> Fraction:
@@ -186,7 +200,7 @@ def load_messages(dbc: Path) -> RobotMessages:
         DescriptionError: The file cannot be read, is no DBC, or not one of this robot.
     """
     try:
-        database = load_dbc(dbc)
+        database: Database = load_dbc(dbc).database
     except CompileError as error:
         raise DescriptionError(f"{error.place}: {error.message}") from error
     try:

@@ -14,7 +14,7 @@ from canopy.compiler.bus_model import Bus, Message, Signal
 ROOT = Path(__file__).parents[2]
 _FLAGS = """
 -std=c11 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wswitch-enum -Wdouble-promotion -Wcast-align
--Wmissing-prototypes -Wvla -Werror
+-Wmissing-prototypes -Wvla -Wtype-limits -Werror -Werror=overflow
 """
 WARNINGS = _FLAGS.split()
 # The Arm compiler comes without a C library: the firmware tests' string.h, for memcpy and its like.

@@ -50,7 +50,7 @@ def remove(*place: str | int) -> Callable[[Any], None]:
         (change("hash", to="0123456789ABCDEF"), "hash: is '0123456789ABCDEF', must be 16 hexadecimal digits"),
         (change("application", to=7), "application: is 7, must be of type str"),
         (change("period_us", to=True), "period_us: is True, must be of type int"),
-        (change("period_us", to=0), "period_us: is 0, must be above 0"),
+        (change("period_us", to=0), "period_us: is 0, must be 1 to 3600000000"),
         (change("tree", to=[]), "tree: is [], must be of type dict"),
         (change("tree", "nodes", to=[]), "tree.nodes: is empty"),
         (change("tree", "nodes", 1, to=3), "tree.nodes[1]: must be a JSON object"),

@@ -12,8 +12,9 @@ from canopy.check.output import as_json, as_sarif, print_text
 from canopy.check.registry import Rule, Severity
 from canopy.check.rules import all_rules, table
 from canopy.check.run import BusOptions, Report, check
-from canopy.compiler.cli import read_type_options, type_options
+from canopy.compiler.cli import in_range, read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.limits import PERIOD_MS
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo_lines
 
@@ -39,9 +40,7 @@ def _wanted(disable: tuple[str, ...], least: Severity) -> list[Rule]:
 @click.argument("trees", metavar="TREE…", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--dbc", type=click.Path(path_type=Path), help="The bus: names of signals are checked, too.")
 @click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
-@click.option(
-    "--period-ms", default=1, type=click.IntRange(1, 3_600_000), help="Also check the cycle times against it."
-)
+@click.option("--period-ms", default=1, type=in_range(PERIOD_MS), help="Also check the cycle times against it.")
 @type_options
 @click.option(
     "--severity",
@@ -106,7 +105,8 @@ def command(
             echo_lines(str(error), err=True)
             unreadable = True
             continue
-        report.findings += one.findings
+        # What is wrong with the bus is said once, not for each tree.
+        report.findings += [finding for finding in one.findings if finding not in report.findings]
         report.allowed += one.allowed
     if json_:
         echo_lines(dumps(as_json(report), indent=1))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 
+from canopy.check.bus_facts import BusFacts
 from canopy.check.status_sets import Outcome, Statuses, outcome
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.leaf_model import Leaf
@@ -28,10 +29,11 @@ class TooLargeError(Exception):
 
 
 class Facts:
-    """The checked tree, its nodes in depth-first order, and what each can return."""
+    """The checked tree, its nodes in depth-first order, and what each can return; and the bus, where one was given."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, bus: BusFacts | None = None) -> None:
         self.tree = tree
+        self.bus = bus
         self.nodes: list[Node] = []
         self._index: dict[int, int] = {}
         self._parent: dict[int, Node] = {}

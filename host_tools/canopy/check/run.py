@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from canopy.check.bus_facts import BusFacts
 from canopy.check.facts import Facts, TooLargeError, elements_by_place
 from canopy.check.registry import Hit, Rule
 from canopy.check.rules import all_rules
@@ -60,12 +61,16 @@ class BusOptions:
 
 
 def _allowed(element: Element) -> set[str]:
-    text = " ".join(
-        (element.attributes.get("_description", ""), element.attributes.get("description", ""), element.text)
+    return _markers(
+        " ".join((element.attributes.get("_description", ""), element.attributes.get("description", ""), element.text)),
+        element.place,
     )
+
+
+def _markers(text: str, place: Place) -> set[str]:
     found = {name.strip() for match in _ALLOW.finditer(text) for name in match[1].split(",")}
     for name in sorted(found - all_rules().keys()):
-        raise CompileError(element.place, f"canopy:allow: no rule '{name}'", nearest(name, all_rules()))
+        raise CompileError(place, f"canopy:allow: no rule '{name}'", nearest(name, all_rules()))
     return found
 
 
@@ -73,13 +78,13 @@ def _finding(rule: Rule, hit: Hit) -> Finding:
     return Finding(rule, hit.place, hit.message, hit.help_text or rule.way_out, hit.node.name if hit.node else None)
 
 
-def _load(path: Path, bus: BusOptions | None, types: Options) -> Tree:
+def _load(path: Path, bus: BusOptions | None, types: Options) -> Facts:
     if bus is None:
-        return read_tree(path, types)
+        return Facts(read_tree(path, types))
     application = load_application(
         "check", path, bus.dbc, bus.node, bus.period_ms, _BITRATE, types.include, options=types
     )
-    return application.table.tree
+    return Facts(application.table.tree, BusFacts(application.bus, bus.period_ms))
 
 
 def _refused(path: Path, rules: Iterable[Rule], error: CompileError) -> list[Finding]:
@@ -132,12 +137,15 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
     report = Report()
     types = types or Options()
     try:
-        facts = Facts(_load(path, bus, types))
+        facts = _load(path, bus, types)
     except CompileError as error:
         report.findings = _refused(path, wanted, error)
         return report
     files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
     allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
+    for places, comment in facts.bus.comments() if facts.bus is not None else ():
+        for place in places:
+            allowed[place] = allowed.get(place, set()) | _markers(comment, place)
     hits = [found for rule in wanted for found in _ask(rule, facts)]
     if any(rule.id == "unused-tree" for rule in wanted):
         hits += _unused(facts.tree, types, wanted)

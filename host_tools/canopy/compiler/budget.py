@@ -132,7 +132,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
             array(tx_trace, trace_capacity(bus, changes_max)),
             image_in,
             image_out,
-            _entries(table),
+            entries_size(table),
             array(rx_state, max(1, len(bus.receive))),
             array(u16, max(1, table.words, images.words)),
             array(u8, nodes),
@@ -148,7 +148,7 @@ def port_size(port: Port) -> tuple[int, int]:
     return scalar("pointer" if port.writes or port.type.kind in ("text", "user") else port.type.c)
 
 
-def _entries(table: Table) -> tuple[int, int]:
+def entries_size(table: Table) -> tuple[int, int]:
     """The blackboard. Entries of the user's own types are not counted."""
     members = []
     for entry in table.bindings.entries:

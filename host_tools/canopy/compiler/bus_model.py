@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from canopy.compiler.dbc_file import Dbc
 
 FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """What a CAN FD frame can carry (ISO 11898-1, DLC 0..15)."""
@@ -197,7 +201,7 @@ class Bus:
     """The bus as `node` sees it. `load` lists (frame length, extended, fd, cycle ms) of every cyclic message on it.
 
     `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `trace` has the node's trace
-    messages by what they are, whatever comes after that in their names.
+    messages by what they are, whatever comes after that in their names. `source` is the file as it was read.
     """
 
     path: Path
@@ -206,7 +210,8 @@ class Bus:
     receive: tuple[Message, ...]
     send: tuple[Message, ...]
     trace: dict[str, Message]
-    load: tuple[tuple[int, bool, bool, int], ...]
+    source: Dbc = field(repr=False, compare=False)
+    load: tuple[tuple[int, bool, bool, float], ...] = ()
 
     @property
     def messages(self) -> tuple[Message, ...]:

@@ -8,13 +8,16 @@ of signals.
 from __future__ import annotations
 
 import dataclasses
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 from canopy.compiler.bus_model import FD_LENGTHS, Bus, Message, Signal, float_value
 from canopy.compiler.bus_names import name_messages
-from canopy.compiler.dbc_file import attribute, check_node, dbc_id, load_dbc, number
+from canopy.compiler.dbc_file import Dbc, attribute, check_node, load_dbc, number
+from canopy.compiler.dbc_text import dbc_id
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.limits import DATA_ID, EVERY, TIME_MS, count, whole
 from canopy.compiler.names import snake
 from canopy.compiler.signal_reader import is_safe, nearest_allowed, read_signal
 from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace, trace_kind
@@ -24,9 +27,7 @@ __all__ = ["TRACE_LAYOUT", "Bus", "Message", "Signal", "read_bus", "read_message
 E2E_SIGNALS = {"E2E_CRC": (0, 8), "E2E_Counter": (8, 4)}
 
 
-def _check_e2e(place: Place, message: Any, data_id: int) -> None:
-    if data_id > 0xFFFF:
-        raise CompileError(place, f"the E2EDataId {data_id} of message '{message.name}' is more than 65535")
+def _check_e2e(place: Place, message: Any) -> None:
     for name, (start, length) in E2E_SIGNALS.items():
         signal = next((s for s in message.signals if s.name == name), None)
         if signal is None or (signal.start, signal.length, signal.byte_order) != (start, length, "little_endian"):
@@ -43,15 +44,23 @@ def _wire_length(message: Any) -> int:
     return min((known for known in FD_LENGTHS if known >= length), default=length) if message.is_fd else length
 
 
-def _read_message(database: Any, place: Place, message: Any, *, hide_e2e: bool = True) -> Message:
-    data_id = attribute(database, place, message, "E2EDataId", -1)
-    protected = data_id >= 0
-    if protected and hide_e2e:
-        _check_e2e(place, message, data_id)
-    cycle = attribute(database, place, message, "GenMsgCycleTime", 0)
-    timeout = attribute(database, place, message, "GenMsgTimeoutTime", 0) or 5 * cycle
-    seen = [signal for signal in message.signals if not (protected and hide_e2e and signal.name in E2E_SIGNALS)]
-    signals = [read_signal(database, place, message, signal) for signal in seen]
+def _cycle_ms(dbc: Dbc, message: Any, *, for_codec: bool) -> int:
+    if for_codec:  # it only tells the user: there is no constant for what is no whole number
+        value = number(dbc, "GenMsgCycleTime", message)
+        if value is not None and value % 1:
+            return 0
+    return attribute(dbc, "GenMsgCycleTime", TIME_MS, message) or 0
+
+
+def _read_message(dbc: Dbc, message: Any, *, for_codec: bool = False) -> Message:
+    data_id = attribute(dbc, "E2EDataId", DATA_ID, message)
+    hide_e2e = data_id is not None and data_id >= 0 and not for_codec
+    if hide_e2e:
+        _check_e2e(dbc.text.message(message), message)
+    cycle = _cycle_ms(dbc, message, for_codec=for_codec)
+    timeout = None if for_codec else attribute(dbc, "GenMsgTimeoutTime", TIME_MS, message)
+    seen = [signal for signal in message.signals if not (hide_e2e and signal.name in E2E_SIGNALS)]
+    signals = [read_signal(dbc, message, signal) for signal in seen]
     return Message(
         name=message.name,
         c_name=snake(message.name),
@@ -60,8 +69,8 @@ def _read_message(database: Any, place: Place, message: Any, *, hide_e2e: bool =
         fd=message.is_fd,
         length=_wire_length(message),
         cycle_ms=cycle,
-        timeout_ms=timeout,
-        data_id=data_id if protected else None,
+        timeout_ms=timeout or 5 * cycle,
+        data_id=data_id if data_id is not None and data_id >= 0 else None,
         # A multiplexer before the signals that it selects.
         signals=tuple(sorted(signals, key=lambda signal: len(signal.selectors))),
         comment=str(message.comment or ""),
@@ -80,23 +89,37 @@ def _check_frame(place: Place, message: Message) -> None:
         )
 
 
-def _check_outputs(place: Place, database: Any, messages: tuple[Message, ...], period_ms: int) -> None:
+def _check_outputs(dbc: Dbc, messages: tuple[Message, ...], period_ms: int) -> None:
     for message in messages:
+        owner = dbc.database.get_message_by_name(message.name)
+        place = dbc.text.attribute("GenMsgCycleTime", owner)
         if message.cycle_ms == 0 or message.cycle_ms % period_ms:
             raise CompileError(
                 place,
                 f"message '{message.name}' is sent every {message.cycle_ms} ms, which is no multiple of the period",
                 f"set GenMsgCycleTime to a multiple of {period_ms} (ms), or change the period",
             )
-        owner = database.get_message_by_name(message.name)
+        _check_every(place, message, period_ms)
         for signal in message.signals:
-            if number(database, place, owner.get_signal_by_name(signal.name), "GenSigInactiveValue") is None:
+            written = owner.get_signal_by_name(signal.name)
+            if number(dbc, "GenSigInactiveValue", owner, written) is None:
                 raise CompileError(
-                    place,
+                    dbc.text.signal(owner, written),
                     f"output '{message.name}.{signal.name}' has no safe value",
                     f'add BA_ "GenSigInactiveValue" SG_ {dbc_id(owner)} {signal.name} VALUE; to the DBC',
                 )
-            _check_safe(place, message, signal)
+            _check_safe(dbc.text.attribute("GenSigInactiveValue", owner, written), message, signal)
+
+
+def _check_every(place: Place, message: Message, period_ms: int) -> None:
+    """A longer one would become another number of ticks in C, 0 among them."""
+    whole(
+        max(1, message.cycle_ms // period_ms),
+        EVERY,
+        f"GenMsgCycleTime of message '{message.name}', {message.cycle_ms} ms in ticks of {period_ms} ms,",
+        place,
+        f"at most {EVERY.high * period_ms} ms with this period",
+    )
 
 
 def _check_safe(place: Place, message: Message, signal: Signal) -> None:
@@ -122,13 +145,24 @@ def _with_good_safe_values(message: Message) -> Message:
     return dataclasses.replace(message, signals=signals)
 
 
+def _load(dbc: Dbc) -> tuple[tuple[int, bool, bool, float], ...]:
+    """The cyclic messages of every node, for the bus load. Of these a fraction of a millisecond does no harm."""
+    result = []
+    for message in dbc.database.messages:
+        cycle = number(dbc, "GenMsgCycleTime", message) or Decimal(0)
+        if cycle % 1 == 0 or not 0 < cycle < TIME_MS.high:
+            cycle = Decimal(attribute(dbc, "GenMsgCycleTime", TIME_MS, message) or 0)
+        result.append((_wire_length(message), message.is_extended_frame, message.is_fd, float(cycle)))
+    return tuple(result)
+
+
 def _by_id(database: Any) -> list[Any]:
     return sorted(database.messages, key=lambda message: (message.is_extended_frame, message.frame_id))
 
 
 def _make_bus(
     path: Path,
-    database: Any,
+    dbc: Dbc,
     node: str,
     receive: list[Message],
     send: list[Message],
@@ -136,7 +170,8 @@ def _make_bus(
     name: str | None = None,
 ) -> Bus:
     """The bus, with C names, each its own."""
-    place = Place(str(path))
+    for what, messages in (("receives", receive), ("sends", send)):
+        count(messages, f"messages that node '{node}' {what}", Place(str(path)))
     known = {message.name: message for message in (*receive, *send)}
     named = {message.name: message for message in name_messages(tuple(known.values()))}
     return Bus(
@@ -146,10 +181,7 @@ def _make_bus(
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
         trace=trace,
-        load=tuple(
-            (_wire_length(m), m.is_extended_frame, m.is_fd, attribute(database, place, m, "GenMsgCycleTime", 0))
-            for m in database.messages
-        ),
+        source=dbc,
     )
 
 
@@ -162,31 +194,32 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
         CompileError: the file cannot be read, has no such node, or has something that cannot be compiled.
     """
     place = Place(str(path))
-    database = load_dbc(path)
-    check_node(place, database, node)
+    dbc = load_dbc(path)
+    check_node(place, dbc.database, node)
     trace: dict[str, Message] = {}
     receive: list[Message] = []
     send: list[Message] = []
-    for message in _by_id(database):
+    for message in _by_id(dbc.database):
         sent = node in message.senders
         kind = trace_kind(message.name) if sent else None
         if kind is not None:
-            check_trace(place, message, kind)
+            check_trace(dbc.text.message(message), message, kind)
             if kind in trace:
                 raise CompileError(
-                    place,
+                    dbc.text.message(message),
                     f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
                     "give each node that runs a tree its own",
                 )
-            trace[kind] = _read_message(database, place, message)
+            trace[kind] = _read_message(dbc, message)
+            _check_every(dbc.text.attribute("GenMsgCycleTime", message), trace[kind], period_ms)
         elif sent:
-            send.append(_read_message(database, place, message))
+            send.append(_read_message(dbc, message))
         elif any(node in signal.receivers for signal in message.signals):
-            receive.append(_read_message(database, place, message))
+            receive.append(_read_message(dbc, message))
     for message in receive + send:
-        _check_frame(place, message)
-    bus = _make_bus(path, database, node, receive, send, trace, name)
-    _check_outputs(place, database, bus.send, period_ms)
+        _check_frame(dbc.text.message(dbc.database.get_message_by_name(message.name)), message)
+    bus = dataclasses.replace(_make_bus(path, dbc, node, receive, send, trace, name), load=_load(dbc))
+    _check_outputs(dbc, bus.send, period_ms)
     return bus
 
 
@@ -199,22 +232,22 @@ def read_messages(path: Path, node: str = "", only: tuple[str, ...] = ()) -> Bus
         CompileError: the file cannot be read, has no such node or message, or has something that cannot be compiled.
     """
     place = Place(str(path))
-    database = load_dbc(path)
+    dbc = load_dbc(path)
     if node:
-        check_node(place, database, node)
-    names = [message.name for message in database.messages]
+        check_node(place, dbc.database, node)
+    names = [message.name for message in dbc.database.messages]
     for name in only:
         if name not in names:
             raise CompileError(place, f"no message '{name}'", nearest(name, names))
     receive: list[Message] = []
     send: list[Message] = []
-    for message in _by_id(database):
+    for message in _by_id(dbc.database):
         sent = not node or node in message.senders
         received = not node or any(node in signal.receivers for signal in message.signals)
         if (sent or received) and (not only or message.name in only):
-            read = _with_good_safe_values(_read_message(database, place, message, hide_e2e=False))
+            read = _with_good_safe_values(_read_message(dbc, message, for_codec=True))
             if received:
                 receive.append(read)
             if sent:
                 send.append(read)
-    return _make_bus(path, database, node, receive, send, {})
+    return _make_bus(path, dbc, node, receive, send, {})

@@ -14,7 +14,8 @@ from canopy.compiler.bounds import BURST, LATENCY_US, LOAD_PERCENT, Bounds, Othe
 from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.image_room import DEFAULT_USES, MAX_NODES, MAX_USES
+from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
+from canopy.compiler.limits import BITRATE, PERIOD_MS, Limits
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options, is_fixed_point
@@ -102,6 +103,11 @@ def type_options(command: _Command) -> _Command:
     return command
 
 
+def in_range(limits: Limits) -> click.IntRange:
+    """The type of an option whose value becomes a C integer."""
+    return click.IntRange(limits.low, limits.high)
+
+
 def read_packages(packages: tuple[str, ...]) -> dict[str, Path]:
     """What `package_option` was given.
 
@@ -154,15 +160,15 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
 @click.argument("tree", type=click.Path(path_type=Path))
 @click.option("--dbc", required=True, type=click.Path(path_type=Path), help="The bus the controller is on.")
 @click.option("--node", required=True, help="The controller's name among the DBC's nodes (BU_).")
-@click.option("--period-ms", required=True, type=click.IntRange(1, 3_600_000), help="Time from tick to tick.")
+@click.option("--period-ms", required=True, type=in_range(PERIOD_MS), help="Time from tick to tick.")
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Folder for the generated files.")
 @click.option("--name", help="Name of the application; the tree file's stem if not given.")
 @type_options
 @click.option("--stubs", "stubs_file", type=click.Path(path_type=Path), help="Write skeletons of what you write.")
 @click.option("--depfile", type=click.Path(path_type=Path), help="Write the files that were read, as make's rule.")
-@click.option("--image-nodes", type=click.IntRange(1, MAX_NODES), help="Keep room for tree images of so many nodes.")
-@click.option("--image-uses", type=click.IntRange(1, MAX_USES), help="Of each leaf in an image; 8 if not given.")
-@click.option("--bitrate", default=500_000, show_default=True, type=click.IntRange(1000), help="Of the bus, in bit/s.")
+@click.option("--image-nodes", type=in_range(IMAGE_NODES), help="Keep room for tree images of so many nodes.")
+@click.option("--image-uses", type=in_range(IMAGE_USES), help="Of each leaf in an image; 8 if not given.")
+@click.option("--bitrate", default=500_000, show_default=True, type=in_range(BITRATE), help="Of the bus, in bit/s.")
 @click.option(
     "--foreign-load",
     default=LOAD_PERCENT,
@@ -184,8 +190,8 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
     type=click.IntRange(0, 1_000_000),
     help="From a free mailbox to its next frame.",
 )
-@click.option("--max-ram", type=int, help="Fail when the static object is larger than so many bytes.")
-@click.option("--max-flash", type=int, help="Fail when the constant tables are larger than so many bytes.")
+@click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
+@click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the budget as JSON.")
 def command(

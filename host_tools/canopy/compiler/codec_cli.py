@@ -10,10 +10,12 @@ import click
 
 from canopy.compiler.bus_model import Bus
 from canopy.compiler.bus_reader import read_bus, read_messages
+from canopy.compiler.cli import in_range
 from canopy.compiler.emit import environment, render_bus
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.generation import tie
 from canopy.compiler.layout import layout
+from canopy.compiler.limits import PERIOD_MS
 from canopy.compiler.output import write_or_exit
 from canopy.escape.terminal import echo, echo_lines
 
@@ -36,7 +38,7 @@ def render_codec(bus: Bus) -> dict[str, str]:
 @click.option("--message", "messages", multiple=True, help="Only this message; may be given again.")
 @click.option(
     "--period-ms",
-    type=click.IntRange(1, 3_600_000),
+    type=in_range(PERIOD_MS),
     help="With --node: the images and tables of canopy/bus.h instead, for a loop of this period.",
 )
 def command(dbc: Path, output: Path, node: str, messages: tuple[str, ...], period_ms: int | None) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-import re
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,20 @@ import cantools
 import cantools.database.can
 from cantools.database.errors import Error as DatabaseError
 
+from canopy.compiler.dbc_text import DbcText
 from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.limits import DATA_ID, TIME_MS, Limits, whole
 from canopy.files import FileError, read_bytes
 
 MAX_BYTES = 16 * 1024 * 1024
-MAX_SIGNALS = 2_048  # of a message
-MAX_MESSAGE_BYTES = 1785  # of J1939's transport protocol
-_MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+(\w+)\s*:\s*(\d+)")
+
+
+@dataclass(frozen=True)
+class Dbc:
+    """A DBC as cantools reads it, and its text, which knows the lines."""
+
+    database: Any
+    text: DbcText
 
 
 def decode_dbc(data: bytes) -> str:
@@ -35,6 +42,18 @@ def decode_dbc(data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def _decoded(path: Path, data: bytes) -> str:
+    try:
+        return decode_dbc(data)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise CompileError(
+            Place(str(path), line),
+            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
+            "save the file as UTF-8",
+        ) from None
+
+
 def read_dbc(path: Path) -> bytes:
     """The bytes of a DBC file.
 
@@ -43,58 +62,43 @@ def read_dbc(path: Path) -> bytes:
     """
     try:
         data = read_bytes(path, MAX_BYTES)
-        decode_dbc(data)
     except FileError as error:
         raise CompileError(Place(str(path)), error.problem) from error
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise CompileError(
-            Place(str(path), line),
-            f"byte 0x{data[error.start]:02x} is no character: a DBC is in UTF-8 or in Windows-1252",
-            "save the file as UTF-8",
-        ) from None
+    _decoded(path, data)
     return data
 
 
-def load_dbc(path: Path) -> Any:
-    """The database of a DBC file, in cantools' strict mode.
+def load_dbc(path: Path) -> Dbc:
+    """A DBC file, in cantools' strict mode: no two signals overlap, and none is longer than its message.
 
     Raises:
         CompileError: it cannot be read, is too large, or has two messages of one name or id.
     """
+    return parse_dbc(path, read_dbc(path))
+
+
+def parse_dbc(path: Path, data: bytes, *, strict: bool = True) -> Dbc:
+    """The same of the bytes of a file. Raises CompileError as load_dbc() does."""
     place = Place(str(path))
-    text = decode_dbc(read_dbc(path))
-    _check_sizes(path, text)
+    content = decode_dbc(data)
+    text = DbcText(str(path), content)
     try:
         logging.getLogger("cantools").setLevel(logging.ERROR)  # what it warns of is refused below
-        database = cantools.database.load_string(text, database_format="dbc", strict=True)
-    except (DatabaseError, ValueError, KeyError, ArithmeticError) as error:
+        database = cantools.database.load_string(content, database_format="dbc", strict=strict)
+    except (DatabaseError, ValueError, LookupError, ArithmeticError, TypeError, AttributeError) as error:
+        # The last four are what cantools does not catch itself: an attribute's type that is none, an index of an enum.
         raise CompileError(place, f"not a DBC that can be read: {error}") from error
     if not isinstance(database, cantools.database.can.Database):
         raise CompileError(place, "not a CAN database")
-    _check_unique(place, database)
-    return database
+    _check_unique(text, database)
+    return Dbc(database, text)
 
 
-def _check_sizes(path: Path, text: str) -> None:
-    """Refuses messages that nobody sends: cantools takes time for each bit of them, and for each pair of signals."""
-    name, signals = "", 0
-    for line_number, line in enumerate(text.splitlines(), 1):
-        place = Place(str(path), line_number)
-        found = _MESSAGE_LENGTH.match(line)
-        if found is not None:
-            name, signals = found[1], 0
-            if len(found[2]) > 4 or int(found[2]) > MAX_MESSAGE_BYTES:
-                raise CompileError(place, f"message '{name}' is longer than {MAX_MESSAGE_BYTES} bytes", "CAN FD has 64")
-        signals += line.lstrip().startswith("SG_ ")
-        if signals > MAX_SIGNALS:
-            raise CompileError(place, f"message '{name}' has more than {MAX_SIGNALS} signals")
-
-
-def _check_unique(place: Place, database: Any) -> None:
+def _check_unique(text: DbcText, database: Any) -> None:
     names: set[str] = set()
     identifiers: dict[tuple[int, bool], str] = {}
     for message in database.messages:
+        place = text.message(message)
         if message.name in names:
             raise CompileError(place, f"there are two messages '{message.name}'")
         names.add(message.name)
@@ -121,21 +125,38 @@ def _given(database: Any, owner: Any, name: str) -> Any:
     return definition.default_value if definition is not None else None
 
 
-def number(database: Any, place: Place, owner: Any, name: str) -> Decimal | None:
-    """An attribute that is a number."""
-    value = _given(database, owner, name)
+def _owner(message: Any, signal: Any) -> str:
+    return f"message '{message.name}'" if signal is None else f"signal '{message.name}.{signal.name}'"
+
+
+def number(dbc: Dbc, name: str, message: Any, signal: Any = None) -> Decimal | None:
+    """An attribute of a message, or of one of its signals, that is a number."""
+    value = _given(dbc.database, message if signal is None else signal, name)
     try:
-        return None if value is None or value == "" else Decimal(str(value))
+        result = None if value is None or value == "" else Decimal(str(value))
     except InvalidOperation:
-        raise CompileError(place, f"attribute {name} of '{owner.name}' is {value!r}, and must be a number") from None
+        result = Decimal("nan")
+    if result is not None and not result.is_finite():
+        raise CompileError(
+            dbc.text.attribute(name, message, signal),
+            f"attribute {name} of {_owner(message, signal)} is {value!r}, and must be a number",
+        )
+    return result
 
 
-def attribute(database: Any, place: Place, owner: Any, name: str, default: int) -> int:
-    """An attribute that is a whole number."""
-    value = number(database, place, owner, name)
-    return default if value is None else int(value)
+def check_timing(dbc: Dbc, message: Any) -> None:
+    """Raises CompileError when a time or the data id of a message is not one that the runtime can have."""
+    for name, limits in (("GenMsgCycleTime", TIME_MS), ("GenMsgTimeoutTime", TIME_MS), ("E2EDataId", DATA_ID)):
+        attribute(dbc, name, limits, message)
 
 
-def dbc_id(message: Any) -> int:
-    """The id as the DBC writes it."""
-    return int(message.frame_id | (0x80000000 if message.is_extended_frame else 0))
+def attribute(dbc: Dbc, name: str, limits: Limits, message: Any, signal: Any = None) -> int | None:
+    """An attribute that is a whole number, within limits.
+
+    Raises:
+        CompileError: it is not; with the line of the attribute.
+    """
+    value = number(dbc, name, message, signal)
+    if value is None:
+        return None
+    return whole(value, limits, f"{name} of {_owner(message, signal)}", dbc.text.attribute(name, message, signal))

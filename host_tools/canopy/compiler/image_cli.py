@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,63 +10,22 @@ from typing import Any
 import click
 
 from canopy.compiler.dbc_file import read_dbc
-from canopy.compiler.emit import MODEL_FORMAT, Application, load_application, model
+from canopy.compiler.emit import Application, load_application, model
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
+from canopy.compiler.image_model import read_firmware
 from canopy.compiler.node_types import node_types
 from canopy.compiler.output import dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo, echo_lines
-from canopy.files import FileError, read_text
+from canopy.files import FileError
 
 BITRATE = 500_000  # of no account for an image
-# What is read of a model file.
-FIELDS: dict[str, type] = {
-    "application": str,
-    "period_us": int,
-    "bus.dbc": str,
-    "bus.node": str,
-    "image.engine": str,
-    **{f"image.{what}": int for what in ("nodes", "uses", "parameters", "words", "texts")},
-    **{f"image.{what}": list for what in ("kinds", "scripts", "entries")},
-    "image.types.floating_point": bool,
-    "image.types.unset_ports": bool,
-    "image.types.map": dict,
-}
-
-
-def _read_model(path: Path) -> dict[str, Any]:
-    """The firmware's model file. canopy.model reads it for tools that watch, and wants a trace."""
-    try:
-        data = json.loads(read_text(path))
-    except FileError as error:
-        raise CompileError(Place(str(path)), error.problem, "the build writes it") from error
-    except (ValueError, RecursionError) as error:
-        raise CompileError(Place(str(path)), f"is no JSON: {error}") from error
-    if not isinstance(data, dict) or data.get("format") != MODEL_FORMAT:
-        raise CompileError(Place(str(path)), "is no model file of this version", "build the firmware again")
-    if "image" not in data:
-        raise CompileError(
-            Place(str(path)), "this firmware takes no images", "build it with IMAGE_NODES, or --image-nodes"
-        )
-    return data
-
-
-def _field(data: dict[str, Any], path: str, kind: type, file: Path) -> Any:
-    """A value of the model file, `image.types.map` for example."""
-    value: Any = data
-    for name in path.split("."):
-        value = value.get(name) if isinstance(value, dict) else None
-    if not isinstance(value, kind):
-        raise CompileError(Place(str(file)), f"{path} is not of type {kind.__name__}", "build the firmware again")
-    return value
 
 
 def _compile(tree: Path, firmware: Path) -> tuple[Application, bytes]:
-    data = _read_model(firmware)
-    for path, kind in FIELDS.items():
-        _field(data, path, kind, firmware)
+    data = read_firmware(firmware)
     bus, types = data["bus"], data["image"]["types"]
     options = Options(types["floating_point"], types["map"], types.get("include"), unset_ports=types["unset_ports"])
     name, period_ms = data["application"], data["period_us"] // 1000

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from canopy.compiler.budget import ImageCost, array, port_size, scalar, struct_size
+from canopy.compiler.budget import ImageCost, array, entries_size, port_size, scalar, struct_size
+from canopy.compiler.limits import COUNT, Limits, count, whole
 from canopy.compiler.table import Table
 
 SLOTS = 2  # CANOPY_IMAGE_SLOTS
 DEFAULT_USES = 8
-MAX_NODES = 65_534
-MAX_USES = 4_096
+IMAGE_NODES = Limits(1, 65_534)
+IMAGE_USES = Limits(1, 4_096)
+IMAGE_TEXTS = Limits(0, 2**32 - 1)
 # A text port's share of the texts of an image.
 TEXT_BYTES = 32
 
@@ -28,9 +30,18 @@ class Room:
 
 
 def make_room(table: Table, nodes: int, uses: int) -> Room:
-    """Two parameters and two state words a node; texts of 32 bytes for each text port of each use."""
+    """Two parameters and two state words a node; texts of 32 bytes for each text port of each use.
+
+    Raises:
+        CompileError: images could not address so much.
+    """
+    place = table.tree.root.place
+    count(entries_size(table)[0], "bytes of entries that tree images can use", place, "make queues shorter")
     text_ports = sum(port.type.kind == "text" for use in table.users for port in use.leaf.ports)
-    return Room(nodes, uses, 2 * nodes, min(2 * nodes, 65_535), TEXT_BYTES * uses * text_ports)
+    texts = whole(
+        TEXT_BYTES * uses * text_ports, IMAGE_TEXTS, "room for the texts of tree images", place, "lower --image-uses"
+    )
+    return Room(nodes, uses, min(2 * nodes, COUNT.high), min(2 * nodes, COUNT.high), texts)
 
 
 def exchangeable(table: Table) -> Table:

@@ -30,6 +30,7 @@ from functools import cached_property
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
+from canopy.compiler.limits import PORTS_MAX
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
@@ -224,6 +225,8 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
                 raise CompileError(child.place, f"port '{port.name}' of '{leaf_id}' is declared again")
             draft.ports.append(port)
             draft.c_names.add(port.c_name)
+            if len(draft.ports) > PORTS_MAX:
+                raise CompileError(child.place, f"'{leaf_id}' has more than {PORTS_MAX} ports")
         elif child.tag == "MetadataFields":
             _read_metadata(child, draft)
         elif child.tag != "description":

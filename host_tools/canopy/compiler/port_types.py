@@ -6,6 +6,7 @@ from __future__ import annotations
 import difflib
 import html
 import re
+import struct
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -227,6 +228,8 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
             raise CompileError(place, f"{where}: '{text}' is not a number ({kind.c})") from None
         if value != value or value in (float("inf"), float("-inf")):
             raise CompileError(place, f"{where}: '{text}' is not a finite number")
+        if not fits_float(value, kind.c) or (value == 0 and re.search("[1-9]", text.lower().partition("e")[0])):
+            raise CompileError(place, f"{where}: '{text}' is too large or too small for a {kind.c}")
         return repr(value) + ("f" if kind.c == "float" else "")
     if kind.kind == "user":
         if not is_c_identifier(text):
@@ -245,6 +248,14 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
     if not kind.low <= value <= kind.high:
         raise CompileError(place, f"{where}: {value} is outside {kind.c} [{kind.low}, {kind.high}]")
     return integer(value, kind)
+
+
+def fits_float(value: float, c_type: str) -> bool:
+    """Can a `float` or `double` hold the number, be it rounded, without becoming infinite or 0?"""
+    try:
+        return struct.unpack("<f", struct.pack("<f", value))[0] != 0 or value == 0 or c_type == "double"
+    except OverflowError:
+        return c_type == "double"
 
 
 def _steps(text: str, kind: PortType, where: str, place: Place) -> int:

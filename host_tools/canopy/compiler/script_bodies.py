@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.bus_reader import Bus
+from canopy.compiler.limits import count
 from canopy.compiler.port_types import TEXT, literal
 from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess
 from canopy.compiler.script.storing import stripped
@@ -105,6 +106,7 @@ class Bodies:
         texts = [text.strip() for text in script.text.split(";") if text.strip()]
         if not texts:
             raise ScriptError(0, "the list is empty", 'for example queue="1;2;3"')
+        count(texts, "items of the list", place)
         if script.type == TEXT:
             items, c_type = [f"{self._texts.index(text)}u" for text in texts], "uint16_t"
         else:

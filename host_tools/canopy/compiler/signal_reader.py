@@ -3,13 +3,20 @@
 
 from __future__ import annotations
 
+import sys
 from decimal import Decimal
 from typing import Any
 
 from canopy.compiler.bus_model import Ranges, Selector, Signal, cut, float_bits, float_value, merge
-from canopy.compiler.dbc_file import dbc_id, number
+from canopy.compiler.dbc_file import Dbc, attribute, number
+from canopy.compiler.dbc_text import dbc_id
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.limits import RAW
 from canopy.compiler.names import snake
+
+SCALE_MIN, SCALE_MAX = 1e-100, 1e100
+"""Of scales and offsets: products of some of them are still far within a double."""
+DOUBLE_MAX = sys.float_info.max
 
 
 def _raw(physical: Any, scale: Decimal, offset: Decimal) -> Decimal:
@@ -82,6 +89,21 @@ def _range(place: Place, where: str, signal: Any, limits: tuple[int, int]) -> tu
     return max(low, limits[0]), min(high, limits[1])
 
 
+def _check_numbers(place: Place, where: str, signal: Any) -> None:
+    """They are computed with in double by the macros, and exactly here; cantools takes 1e400 for infinity."""
+    for what, value, smallest, largest in (
+        ("scale", signal.scale, SCALE_MIN, SCALE_MAX),
+        ("offset", signal.offset, 0, SCALE_MAX),
+        ("minimum", signal.minimum or 0, 0, DOUBLE_MAX),
+        ("maximum", signal.maximum or 0, 0, DOUBLE_MAX),
+    ):
+        if value != 0 and not smallest <= abs(value) <= largest:
+            size = f"from {smallest:g} " if smallest else "up "
+            raise CompileError(
+                place, f"{where} has the {what} {value:g}", f"numbers {size}to {largest:g} in size are possible"
+            )
+
+
 def _check_size(place: Place, where: str, signal: Any) -> None:
     if signal.is_float and signal.length not in (32, 64):
         raise CompileError(place, f"{where} is a float of {signal.length} bits", "SIG_VALTYPE_ goes with 32 or 64 bits")
@@ -91,10 +113,12 @@ def _check_size(place: Place, where: str, signal: Any) -> None:
         raise CompileError(place, f"{where} has the scale 0, so all its values are the same", "set its scale, or 1")
 
 
-def read_signal(database: Any, place: Place, message: Any, signal: Any) -> Signal:
+def read_signal(dbc: Dbc, message: Any, signal: Any) -> Signal:
     """The signal, from cantools' one. Raises CompileError for what has no code."""
+    place = dbc.text.signal(message, signal)
     where = f"signal '{message.name}.{signal.name}'"
     _check_size(place, where, signal)
+    _check_numbers(place, where, signal)
     if signal.is_float:
         limits = float_bits(float("-inf"), signal.length), float_bits(float("inf"), signal.length)
     elif signal.is_signed:
@@ -121,16 +145,17 @@ def read_signal(database: Any, place: Place, message: Any, signal: Any) -> Signa
         selectors=_selectors(place, where, message, signal),
         selects=_selects(place, where, message, signal),
     )
-    return Signal(**{**result.__dict__, "safe": _safe(database, place, result, signal)})
+    return Signal(**{**result.__dict__, "safe": _safe(dbc, message, result, signal)})
 
 
-def _safe(database: Any, place: Place, signal: Signal, given: Any) -> int:
+def _safe(dbc: Dbc, message: Any, signal: Signal, given: Any) -> int:
     """GenSigInactiveValue; where there is none, of all that may be sent, what is nearest to 0."""
-    value = number(database, place, given, "GenSigInactiveValue")
     if signal.is_float:
+        value = number(dbc, "GenSigInactiveValue", message, given)
         bits = float_bits(float(value or 0), signal.length)
         return bits if value is not None else nearest_allowed(signal, bits)
-    return int(value) if value is not None else nearest_allowed(signal, 0)
+    raw = attribute(dbc, "GenSigInactiveValue", RAW, message, given)
+    return raw if raw is not None else nearest_allowed(signal, 0)
 
 
 def nearest_allowed(signal: Signal, raw: int) -> int:

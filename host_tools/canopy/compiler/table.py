@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from canopy.compiler.binding import Bindings, BoundPort
 from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.limits import count
 from canopy.compiler.tree import Node, Script, Tree
 
 
@@ -169,6 +170,26 @@ class _Layout:
         return index
 
 
+def _check_sizes(table: Table) -> None:
+    """Places in the tables are 16 bits wide, in the engine and in entries that hold texts."""
+    help_text = "divide the tree among several applications"
+    place = table.tree.root.place
+    for things, what in (
+        (table.words, "words of state of all nodes together"),
+        (table.parameters, "parameters of all nodes together"),
+        (table.scripts, "scripts that differ"),
+        (table.bindings.texts, "texts that differ"),
+        (table.bindings.entries, "entries"),
+    ):
+        count(things, what, place, help_text)
+
+
 def make_table(tree: Tree, bindings: Bindings | None = None) -> Table:
-    """Lays the tree out."""
-    return _Layout(tree, bindings or Bindings()).table()
+    """Lays the tree out.
+
+    Raises:
+        CompileError: it needs more room than the engine can address.
+    """
+    table = _Layout(tree, bindings or Bindings()).table()
+    _check_sizes(table)
+    return table

@@ -7,9 +7,20 @@ from canopy.check.registry import RULES, Rule
 
 # The order of the table.
 # isort: off
-from canopy.check.rules import reach, parallel, reactive, reactivity, guards, outcomes, declarations
+from canopy.check.rules import reach, parallel, reactive, reactivity, guards, outcomes, declarations, bus
 
-__all__ = ["all_rules", "declarations", "guards", "outcomes", "parallel", "reach", "reactive", "reactivity", "table"]
+__all__ = [
+    "all_rules",
+    "bus",
+    "declarations",
+    "guards",
+    "outcomes",
+    "parallel",
+    "reach",
+    "reactive",
+    "reactivity",
+    "table",
+]
 
 
 def all_rules() -> dict[str, Rule]:

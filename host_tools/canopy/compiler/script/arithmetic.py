@@ -68,16 +68,13 @@ class Arithmetic:
         if isinstance(value, Double):
             return value.c
         if isinstance(value, Const):
-            try:
-                return repr(float(value.value))
-            except OverflowError:
-                raise ScriptError(index, "a number that is too large for floating point") from None
+            return repr(_as_float(value.value, index))
         if isinstance(value, Num):
             text = f"(double){value.c}"
             if value.scale.numerator != 1:
-                text += f" * {float(value.scale.numerator)!r}"
+                text += f" * {_as_float(value.scale.numerator, index)!r}"
             if value.scale.denominator != 1:
-                text += f" / {float(value.scale.denominator)!r}"
+                text += f" / {_as_float(value.scale.denominator, index)!r}"
             return text if value.scale == 1 else f"({text})"
         raise ScriptError(index, f"{describe(value)} is no number")
 
@@ -231,15 +228,18 @@ class Arithmetic:
             return Const(Fraction(functions[sign](int(first.value), int(second.value))))
         one, two = self.scaled(first, Fraction(1), index), self.scaled(second, Fraction(1), index)
         wide = one.wide or two.wide
-        if one.low >= 0 and two.low >= 0:
-            ends = (one.high, two.high)
-            low, high = 0, min(ends) if sign == "&" else 2 ** max(end.bit_length() for end in ends) - 1
+        if sign == "&" and max(one.low, two.low) >= 0:
+            low, high = 0, min(side.high for side in (one, two) if side.low >= 0)
+        elif one.low >= 0 and two.low >= 0:
+            low, high = 0, 2 ** max(end.bit_length() for end in (one.high, two.high)) - 1
         else:
             # The fewest bits that hold both sides: C compilers warn of comparisons that these already decide.
             bits = max((~end if end < 0 else end).bit_length() for end in (one.low, one.high, two.low, two.high))
             low, high = -(2**bits), 2**bits - 1
         c = f"({one.as_type(wide)} {sign} {two.as_type(wide)})"
-        return Num(c, "int64_t" if wide else "int32_t", low, high)
+        masks = [int(side.value) for side in (first, second) if isinstance(side, Const)]
+        zeros, ones = ~masks[0] if masks and sign == "&" else 0, masks[0] if masks and sign == "|" else 0
+        return Num(c, "int64_t" if wide else "int32_t", low, high, zeros=zeros, ones=ones)
 
     def compare(self, sign: str, left: Value, right: Value, index: int) -> Num | Const:
         """One comparison; texts can only be equal or not."""
@@ -281,6 +281,8 @@ class Arithmetic:
             return Const(
                 Fraction(_COMPARE[sign](Fraction(left.high if bound > left.high else left.low), bound)), is_bool=True
             )
+        if sign in ("==", "!=") and (bound & left.zeros or ~bound & left.ones):
+            return Const(Fraction(sign == "!="), is_bool=True)
         always = {"<": bound > left.high, "<=": bound >= left.high, ">": bound < left.low, ">=": bound <= left.low}
         never = {"<": bound <= left.low, "<=": bound < left.low, ">": bound >= left.high, ">=": bound > left.high}
         if always.get(sign, False) or never.get(sign, False):  # by the range alone
@@ -327,6 +329,16 @@ class Arithmetic:
         if isinstance(yes, (TextConst, TextVar)) and isinstance(no, (TextConst, TextVar)):
             return TextVar(f"(uint16_t)({condition.c} ? {self.text(yes)} : {self.text(no)})")
         raise ScriptError(index, f"'?:' chooses between {describe(yes)} and {describe(no)}", "both must be of one kind")
+
+
+def _as_float(value: Fraction | int, index: int) -> float:
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ScriptError(index, "a number that is too large for floating point") from None
+    if result == 0 and value != 0:
+        raise ScriptError(index, "a number that is too small for floating point")
+    return result
 
 
 def _step(value: Num | Const) -> Fraction:

@@ -12,7 +12,6 @@ from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
 from canopy.compiler.codec import value_type
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.names import snake
 from canopy.compiler.numbers import exact, plain
 from canopy.compiler.port_types import DOUBLE, FLOAT, PortType
 from canopy.compiler.script.arithmetic import Arithmetic
@@ -319,17 +318,18 @@ class Compiler:
         """The C expression of a raw value, of the setter's type."""
         if signal.is_float:
             return self._raw_float(value, signal, index)
-        if signal.choices:
-            names = {name: raw for raw, name in signal.choices}
-            enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}"
-            if isinstance(value, TextConst):
-                if value.text not in names:
-                    raise ScriptError(index, f"'{value.text}' is no value of '{text}'", nearest(value.text, names))
-                return f"{enum}_{snake(value.text)}".upper()
+        if isinstance(value, TextConst) and signal.choices:
+            names = {named.text: named.c_name for named in signal.enumerators if signal.is_enum}
+            names = names or {named.text: named.c_name for named in signal.exceptions}
+            if value.text not in names:
+                raise ScriptError(index, f"'{value.text}' is no value of '{text}'", nearest(value.text, names))
+            return f"{self._bus.name.upper()}_{names[value.text]}"
+        if signal.is_enum:
             if not isinstance(value, (Num, Const)):
                 raise ScriptError(index, f"{describe(value)} is no value of '{text}'")
             wide = PortType("int", "int32_t", -(2**31), 2**31 - 1)
-            return f"({enum}_t)({self.storing.whole(value, wide, index)})"
+            enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}_t"
+            return f"({enum})({self.storing.whole(value, wide, index)})"
         if signal.is_bool:
             truth = self._arithmetic.truth(value, index)
             return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 
 from canopy.compiler.numbers import plain
-from canopy.compiler.port_types import PortType, integer
+from canopy.compiler.port_types import PortType, fits_float, integer
 from canopy.compiler.script.arithmetic import Arithmetic
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import INT64, Const, Double, Num, TextConst, TextVar, Value, describe, number
@@ -37,6 +37,8 @@ class Storing:
             raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
         if kind.kind == "float":
             c = self._arithmetic.double(value, index)
+            if isinstance(value, Const) and not fits_float(float(value.value), kind.c):
+                raise ScriptError(index, f"{plain(value.value)} is too large or too small for a {kind.c}")
             return c if kind.c == "double" else f"(float)({stripped(c)})"
         if kind.kind == "bool":
             truth = self._arithmetic.truth(value, index)

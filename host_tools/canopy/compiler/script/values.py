@@ -29,7 +29,8 @@ class Const:
 class Num:
     """A number: the C expression `c` of type `c_type`, in [low, high], times `scale`.
 
-    `choices` are the names of a signal's values, with `c`'s value for each.
+    `choices` are the names of a signal's values, with `c`'s value for each. `zeros` and `ones` are bits of `c` that are
+    known, from a mask: C compilers warn of comparisons that these decide.
     """
 
     c: str
@@ -40,6 +41,8 @@ class Num:
     is_bool: bool = False
     literal: int | None = None
     choices: dict[str, int] = field(default_factory=dict)
+    zeros: int = 0
+    ones: int = 0
 
     @property
     def wide(self) -> bool:
