@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import random
 import re
+import subprocess
 from fractions import Fraction
 from pathlib import Path
 
@@ -144,3 +145,21 @@ def test_the_model_file_has_them(tmp_path: Path) -> None:
     bounds = json.loads((tmp_path / "out/get_home.model.json").read_text())["budget"]["bounds"]
     assert bounds["others"] == {"load_percent": 60, "burst": 3, "latency_us": 20}
     assert [output["name"] for output in bounds["outputs"]] == ["PowerCommand", "PostureCommand"]
+
+
+def test_names_of_the_images_own_members_are_kept(tmp_path: Path) -> None:
+    dbc = (
+        "BU_: Controller B\nBO_ 1 CanState: 2 B\n"
+        ' SG_ AgeMs : 0|8@1+ (1,0) [0|255] "" Controller\n SG_ Fresh : 8|8@1+ (1,0) [0|255] "" Controller\n'
+        '\nBO_ 2 Overload: 1 B\n SG_ Now : 0|8@1+ (1,0) [0|255] "" Controller\n'
+    )
+    (tmp_path / "b.dbc").write_text(dbc)
+    (tmp_path / "t.xml").write_text(
+        '<root BTCPP_format="4"><BehaviorTree ID="T"><AlwaysSuccess/></BehaviorTree></root>\n'
+    )
+    arguments = ["compile", str(tmp_path / "t.xml"), "--dbc", str(tmp_path / "b.dbc"), "--node", "Controller"]
+    result = CliRunner().invoke(main, [*arguments, "--period-ms", "50", "-o", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    sources = [str(file) for file in (tmp_path / "out").glob("*.c")]
+    includes = [f"-I{ROOT / 'runtime' / 'include'}", f"-I{tmp_path / 'out'}"]
+    subprocess.run(["gcc", "-Wall", "-Wextra", "-Werror", *includes, "-fsyntax-only", *sources], check=True)
