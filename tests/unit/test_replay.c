@@ -12,7 +12,7 @@
 #include "nao_home_app.h"
 #include "unity.h"
 
-enum { INPUTS_ID = 0x604, ARRIVALS_ID = 0x606, SENSOR_ID = 0x100, FRAMES_MAX = 500, TICKS = 30 };
+enum { INPUTS_ID = 0x604, ARRIVALS_ID = 0x606, SENSOR_ID = 0x100, FRAMES_MAX = 340, TICKS = 30 };
 
 /* A record in memory, and what was sent. */
 static struct {

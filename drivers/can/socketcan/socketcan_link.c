@@ -113,7 +113,7 @@ static void read_info(canopy_socketcan_link_t *link, const attribute_t *outer)
 static void read_link(canopy_socketcan_link_t *link, const struct nlmsghdr *answer)
 {
     const struct ifinfomsg *info = NLMSG_DATA(answer);
-    attributes_t attributes = {.next = (const char *)IFLA_RTA(info),
+    attributes_t attributes = {.next = (const char *)answer + NLMSG_SPACE(sizeof *info),
                                .left = answer->nlmsg_len - NLMSG_LENGTH(sizeof *info)};
     const attribute_t *part;
 

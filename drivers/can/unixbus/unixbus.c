@@ -17,6 +17,8 @@
 
 #include "unixbus_internal.h"
 
+enum { LOOK_MS = 100 };
+
 static int64_t monotonic_us(void)
 {
     return canopy_arrival_monotonic() / 1000;
@@ -103,7 +105,11 @@ static void *receive_thread(void *context)
             wake_loop(self);
             return NULL;
         }
-        (void)poll(&descriptor, 1, -1);
+        /*
+         * Not for ever: a poll() that is woken while unixbus_restart() puts another socket under the number looks at the
+         * new one, and goes on waiting for the old one.
+         */
+        (void)poll(&descriptor, 1, LOOK_MS);
     }
     return NULL;
 }
