@@ -10,7 +10,7 @@ SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
 # Of check-all, which judges every change by the same random trees. `make test-differential` takes new ones each time.
 SEED := 20261123
-PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
+PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan tsan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan

@@ -3,7 +3,8 @@
 #                        [MAIN_TREE id] [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
 #                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
-#                        [BITRATE bit/s] [MAX_RAM bytes] [MAX_FLASH bytes])
+#                        [BITRATE bit/s] [FOREIGN_LOAD percent] [FOREIGN_BURST frames] [TX_LATENCY_US us]
+#                        [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
 # generated tables, the bus with its codec, and your leaves. Link it, and a CAN and a clock driver, into your program:
@@ -36,7 +37,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
-                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES"
+                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -54,8 +55,9 @@ function(canopy_add_application NAME)
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
-  foreach(option MAIN_TREE INCLUDE BITRATE MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
-    if(APP_${option})
+  foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US MAX_RAM MAX_FLASH IMAGE_NODES
+                 IMAGE_USES)
+    if(DEFINED APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")
       string(REPLACE ";" "\\;" value "${APP_${option}}") # one argument, whatever is in it

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Instruments everything built here, so that no part is missed:
-#   CANOPY_SANITIZE  sanitizers: address,undefined, or one of them, or memory (clang)
+#   CANOPY_SANITIZE  sanitizers: address,undefined, or one of them, or memory (clang), or thread
 #   CANOPY_COVERAGE  clang's counters for lines, branches and MC/DC (clang 19 or later)
 #   CANOPY_FUZZ      both sanitizers, and the guidance that libFuzzer needs (clang)
 # CANOPY_INSTRUMENTED is true with any of them: such objects need symbols and memory of their own.

@@ -25,11 +25,13 @@ canopy_error_t nao_in_process_init(nao_in_process_t *self, const canopy_app_t *a
 
     *self = (nao_in_process_t){0};
     canopy_sim_nao_init(&self->robot);
-    error = canopy_loopback_join(&self->bus, &self->controller_end, self->controller_queue, NAO_IN_PROCESS_QUEUE, NULL);
+    error = canopy_loopback_join(&self->bus, &self->controller_end, self->controller_queue, NAO_IN_PROCESS_QUEUE,
+                                 app->acceptance);
     if (error != CANOPY_OK) {
         return error;
     }
-    error = canopy_loopback_join(&self->bus, &self->robot_end, self->robot_queue, NAO_IN_PROCESS_QUEUE, NULL);
+    error = canopy_loopback_join(&self->bus, &self->robot_end, self->robot_queue, NAO_IN_PROCESS_QUEUE,
+                                 CANOPY_CAN_ACCEPT_EVERYTHING);
     if (error != CANOPY_OK) {
         return error;
     }
@@ -47,8 +49,8 @@ static void put(uint8_t *data, unsigned bytes, int32_t value)
 
 static void send_sensors(nao_in_process_t *self)
 {
-    canopy_can_frame_t battery = {.id = NAO_BATTERY_ID, .length = NAO_BATTERY_LENGTH};
-    canopy_can_frame_t posture = {.id = NAO_POSTURE_ID, .length = NAO_POSTURE_LENGTH};
+    canopy_can_frame_t battery = {.id = NAO_BATTERY_ID, .length = NAO_BATTERY_LENGTH, .time = self->now - self->age};
+    canopy_can_frame_t posture = {.id = NAO_POSTURE_ID, .length = NAO_POSTURE_LENGTH, .time = self->now - self->age};
     const canopy_can_t *can = &self->robot_end.can;
 
     battery.data[1] = self->robot.power.charging ? CHARGING_BIT : 0;
@@ -59,8 +61,8 @@ static void send_sensors(nao_in_process_t *self)
     put(&posture.data[4], 2, self->robot.posture.head_height_mm);
     canopy_e2e_protect(POSTURE_DATA_ID, self->counter, posture.data, posture.length);
     self->counter = (uint8_t)((self->counter + 1u) % CANOPY_E2E_COUNTERS);
-    (void)can->send(can->context, &battery);
-    (void)can->send(can->context, &posture);
+    (void)can->send(can->context, 0, &battery);
+    (void)can->send(can->context, 0, &posture);
 }
 
 static void take_commands(nao_in_process_t *self)

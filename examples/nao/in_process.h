@@ -27,7 +27,8 @@ typedef struct {
     canopy_loop_config_t config;
     canopy_loop_t loop;
     canopy_time_t now;
-    uint8_t counter; /* E2E, of both sensor messages */
+    canopy_time_t age; /**< Of the sensors' frames when the controller takes them [us]. */
+    uint8_t counter;   /* E2E, of both sensor messages */
 } nao_in_process_t;
 
 /** Joins the application and a robot in the state in which the paper's examples begin (canopy_sim_nao_init()). */

@@ -40,24 +40,24 @@ static options_t options;
 
 static void print_help(FILE *file)
 {
-    fprintf(file,
-            "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
-            "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
-            "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
-            "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
-            "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
-            "  --ticks N     end after N ticks\n"
-            "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
-            "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
-            "  --quiet       no summary at the end\n"
-            "  --help        this text\n\n"
-            "Examples:\n"
-            "  %s --can socketcan:vcan0\n"
-            "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
-            "  gdb --args %s --replay run.replay\n\n"
-            "Exit status: 0 ended as asked, 1 the bus or a file failed, 2 wrong command line.\n",
-            CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name,
-            CANOPY_APP.name);
+    fprintf(
+        file,
+        "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
+        "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
+        "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
+        "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
+        "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
+        "  --ticks N     end after N ticks\n"
+        "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
+        "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
+        "  --quiet       no summary at the end\n"
+        "  --help        this text\n\n"
+        "Examples:\n"
+        "  %s --can socketcan:vcan0\n"
+        "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
+        "  gdb --args %s --replay run.replay\n\n"
+        "Exit status: 0 ended as asked, the safe values are out; 1 the bus or a file failed; 2 wrong command line.\n",
+        CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.period / 1000u, CANOPY_APP.name, CANOPY_APP.name, CANOPY_APP.name);
 }
 
 static uint32_t parse_ticks(const char *text)
@@ -78,7 +78,7 @@ static void check(const options_t *given, bool more)
     const char *wrong = NULL;
 
     if (more) {
-        wrong = "an argument too many";
+        wrong = "unexpected argument";
     } else if (given->replay == NULL && given->can == NULL) {
         wrong = "--can is missing";
     } else if (given->replay != NULL && (given->can != NULL || given->lock_step || given->ticks != 0u)) {
@@ -142,11 +142,48 @@ static bool after_cycle(void *context, canopy_status_t root)
     return options.ticks == 0u || loop.ticks < options.ticks;
 }
 
+/** What the driver cannot promise on this bus, and what to do about it. */
+static void print_advice(void)
+{
+    const char *advice;
+
+    for (unsigned number = 0; (advice = canopy_can_advice(&port, number)) != NULL; number++) {
+        fprintf(stderr, "%s: %s: %s\n", CANOPY_APP.name, options.can, advice);
+    }
+}
+
+/** Tells people when the bus fails and when it is back; everything else is in the summary. */
+static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
+{
+    static const char *const states[] = {[CANOPY_CAN_ERROR_ACTIVE] = "error-active",
+                                         [CANOPY_CAN_ERROR_WARNING] = "error-warning",
+                                         [CANOPY_CAN_ERROR_PASSIVE] = "error-passive",
+                                         [CANOPY_CAN_BLOCKED] = "blocked: no frame gets out",
+                                         [CANOPY_CAN_BUS_OFF] = "bus-off",
+                                         [CANOPY_CAN_DOWN] = "down",
+                                         [CANOPY_CAN_GONE] = "gone"};
+
+    static bool was_unusable;
+    bool is_unusable = canopy_can_is_unusable((canopy_can_state_t)detail);
+
+    (void)context;
+    if (fault != CANOPY_FAULT_CAN_STATE || options.replay != NULL) {
+        return;
+    }
+    fprintf(stderr, "%s: %s: the bus is %s\n", CANOPY_APP.name, options.can, states[detail]);
+    if (is_unusable != was_unusable) { /* what it can promise may be something else now */
+        print_advice();
+    }
+    was_unusable = is_unusable;
+}
+
 static void print_summary(const canopy_can_t *can)
 {
     const canopy_bus_counters_t *bus = &CANOPY_APP.bus_state->counters;
+    canopy_tx_counters_t tx;
     canopy_can_stats_t driver;
 
+    canopy_tx_count(CANOPY_APP.tx, &tx);
     can->stats(can->context, &driver);
     if (options.replay != NULL) { /* its clock measures nothing */
         printf("%s: %" PRIu32 " ticks replayed\n", CANOPY_APP.name, loop.ticks);
@@ -156,29 +193,36 @@ static void print_summary(const canopy_can_t *can)
                CANOPY_APP.name, loop.ticks, loop.overruns, loop.slips, loop.longest_cycle, loop.most_late);
     }
     printf("%s: frames accepted %" PRIu32 ", refused %" PRIu32 ", unknown %" PRIu32 ", lost %" PRIu32 "; sent %" PRIu32
-           ", dropped %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
-           CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, bus->sent,
-           bus->tx_dropped, bus->timeouts, CANOPY_APP.tree_instance->faults);
+           ", replaced %" PRIu32 ", expired %" PRIu32 "; timeouts %" PRIu32 ", faults %" PRIu32 "\n",
+           CANOPY_APP.name, bus->accepted, canopy_bus_rejected(bus), bus->unknown_id, driver.rx_dropped, tx.sent,
+           tx.replaced, tx.expired, bus->timeouts, CANOPY_APP.tree_instance->faults);
 }
 
 /** A bus with the clock that goes with it, as the options say. @return false: the message says why. */
 static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
 {
+    static const uint32_t step = SIMULATION_STEP_ID;
+    static canopy_can_acceptance_t with_step = {.ids = &step, .count = 1};
+    const canopy_can_acceptance_t *acceptance = CANOPY_APP.acceptance;
     const atomic_bool *stop = NULL;
 
     if (options.replay != NULL) {
         config->can = &replay.replay.can;
         config->clock = &replay.replay.clock;
-        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace->inputs, message, size) ==
-               CANOPY_OK;
+        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace, message, size) == CANOPY_OK;
     }
-    if (canopy_can_open(&port, options.can, NULL, message, size) != CANOPY_OK) {
+    if (options.lock_step) {
+        with_step.next = acceptance;
+        acceptance = &with_step;
+    }
+    if (canopy_can_open(&port, options.can, acceptance, message, size) != CANOPY_OK) {
         return false;
     }
     if (canopy_posix_stop_on_signals(&stop) != CANOPY_OK) {
         (void)snprintf(message, size, "signals cannot be caught");
         return false;
     }
+    print_advice();
     canopy_posix_clock_init(&posix_clock, stop);
     config->can = port.can;
     config->clock = &posix_clock.clock;
@@ -213,7 +257,8 @@ static canopy_error_t close_bus(void)
 int main(int argc, char **argv)
 {
     char message[CANOPY_CAN_OPEN_MESSAGE > CANOPY_REPLAY_MESSAGE ? CANOPY_CAN_OPEN_MESSAGE : CANOPY_REPLAY_MESSAGE];
-    canopy_loop_config_t config = {.app = &CANOPY_APP, .after_cycle = after_cycle};
+    canopy_loop_config_t config = {.app = &CANOPY_APP, .on_fault = on_fault, .after_cycle = after_cycle};
+    canopy_error_t stopped;
     canopy_error_t error;
 
     options = parse(argc, argv);
@@ -226,14 +271,18 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s: the application's tables are not complete: error %d\n", CANOPY_APP.name, (int)error);
         return EXIT_FAILURE;
     }
-    canopy_loop_run(&loop);
+    stopped = canopy_loop_run(&loop);
     if (!options.quiet) {
         print_summary(config.can);
+    }
+    if (stopped != CANOPY_OK && options.replay == NULL) {
+        fprintf(stderr, "%s: the safe values are not known to be out: the robot must stop by its own timeouts\n",
+                CANOPY_APP.name);
     }
     error = close_bus();
     if (error != CANOPY_OK) {
         fprintf(stderr, "%s: %s failed: error %d\n", CANOPY_APP.name,
                 options.replay != NULL ? options.replay : options.can, (int)error);
     }
-    return error == CANOPY_OK ? EXIT_SUCCESS : EXIT_FAILURE;
+    return error == CANOPY_OK && stopped == CANOPY_OK ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -20,6 +20,7 @@ CATEGORIES = ("control", "decorator", "condition", "action")
 TRACE_MESSAGES = (
     "CanopyTick",
     "CanopyInputs",
+    "CanopyArrivals",
     "CanopyChange",
     "CanopySnapshot",
     "CanopyHealth",

@@ -136,13 +136,14 @@ def load_database(model: Model) -> Database:
 
 
 def _watch(message: DbcMessage, sent: bool) -> _Watched:
-    protected = _attribute(message, "E2EDataId", -1) >= 0
+    protected = message_attribute(message, "E2EDataId", -1) >= 0
     signals = tuple(s for s in message.signals if not (protected and s.name.startswith("E2E_")))
-    timeout_ms = _attribute(message, "GenMsgTimeoutTime", 0) or _CYCLES_TO_TIMEOUT * (message.cycle_time or 0)
+    timeout_ms = message_attribute(message, "GenMsgTimeoutTime", 0) or _CYCLES_TO_TIMEOUT * (message.cycle_time or 0)
     return _Watched(message, signals, sent, timeout_ms / 1000 if timeout_ms else None)
 
 
-def _attribute(message: DbcMessage, name: str, default: int) -> int:
+def message_attribute(message: DbcMessage, name: str, default: int) -> int:
+    """The value of a message's attribute, or the default where neither it nor the DBC gives one."""
     attributes = message.dbc.attributes if message.dbc is not None else {}
     return int(attributes[name].value) if attributes and name in attributes else default
 

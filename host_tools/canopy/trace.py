@@ -53,14 +53,50 @@ def _plain(code: int) -> int:
     return int(Status.IDLE) if code == Status.PREVIOUSLY else code
 
 
+_FILTERED = 0xFFFF
+
+
 @dataclass(frozen=True)
 class Health:
     """The controller's loss counters since its start; each stops at 65535."""
 
     rx_rejected: int = 0
     rx_unknown: int = 0
+    """65535 also where the driver's filter hands over no unknown frames."""
     tx_dropped: int = 0
+    """Commands that were replaced or expired before they left, and trace frames that found no room."""
     faults: int = 0
+
+    @property
+    def unknown(self) -> int | None:
+        """Frames of no message of the controller; None: they are filtered, or too many to count."""
+        return self.rx_unknown if self.rx_unknown != _FILTERED else None
+
+
+CAN_STATES = ("error-active", "error-warning", "error-passive", "blocked", "bus-off", "down", "gone")
+"""The state of the bus by its number in CanopyArrivals (runtime/include/canopy/can_state.h)."""
+
+
+@dataclass(frozen=True)
+class BusState:
+    """What the controller said last of its bus."""
+
+    can_state: int
+    """Index of CAN_STATES."""
+    overload: bool
+    """Frames come faster than they are taken, or were lost: what the tree sees may not be all."""
+    returning: bool
+    """Safe values go out instead of the tree's, until the bus has shown that it works again."""
+
+    @property
+    def is_good(self) -> bool:
+        """As it should be."""
+        return not (self.can_state or self.overload or self.returning)
+
+    def text(self) -> str:
+        """For people, e.g. "blocked, overload"."""
+        more = [*["overload"][: self.overload], *["sends safe values"][: self.returning]]
+        return ", ".join([CAN_STATES[self.can_state], *more])
 
 
 @dataclass(frozen=True)
@@ -86,6 +122,8 @@ class TreeView:
     """Frames with a trace id that were no trace frames of this model."""
     health: Health | None
     """None until the first CanopyHealth."""
+    bus: BusState | None
+    """None until the first CanopyArrivals."""
 
 
 def mismatch(model: Model, data: bytes) -> str | None:
@@ -127,6 +165,7 @@ class TraceDecoder:
     restarts: int = 0
     refused: int = 0
     health: Health | None = None
+    bus: BusState | None = None
     mismatch: str | None = None
     """Why the model is not that of the controller which the last CanopyModel came from; None while they agree."""
 
@@ -168,6 +207,8 @@ class TraceDecoder:
             self.health = Health(*(int.from_bytes(data[place : place + 2], "little") for place in (0, 2, 4, 6)))
         elif name == "CanopyModel":
             self.mismatch = mismatch(self.model, data)
+        elif name == "CanopyArrivals":
+            self._take_arrivals(data)
         return ()  # CanopyInputs is for replays
 
     def flush(self) -> tuple[TreeView, ...]:
@@ -229,6 +270,14 @@ class TraceDecoder:
         self._statuses[first : first + count] = map(_plain, codes[:count])
         return views + self._finish()  # it is a tick's last frame: what has not come by now does not come
 
+    def _take_arrivals(self, data: bytes) -> None:
+        """The ages are for replays. Bit 7 is not used."""
+        state = data[0] & 7
+        if state >= len(CAN_STATES) or data[0] & 0x80:
+            self.refused += 1
+            return
+        self.bus = BusState(state, bool(data[0] & 0x08), bool(data[0] & 0x40))
+
     def _follow_in_tick(self, sequence: int) -> tuple[TreeView, ...]:
         """_follow() for a frame within a tick: the one at hand, or a later one whose CanopyTick was lost.
 
@@ -268,6 +317,7 @@ class TraceDecoder:
         """The new run's sequence has nothing to do with the old one's: what is missing between them is not a loss."""
         self.restarts += 1
         self.health = None
+        self.bus = None
         self._last_tick = number
         self._sequence = data[0]
         self._overruns = data[7]
@@ -292,5 +342,6 @@ class TraceDecoder:
             restarts=self.restarts,
             refused=self.refused,
             health=self.health,
+            bus=self.bus,
         )
         return (view,)

@@ -62,7 +62,8 @@ def line(watch: Watch, now: float) -> str:
     )
     leaves = ", ".join(active[:_LEAF_NAMES_IN_A_LINE]) + more
     return (
-        f"tick {view.tick} {status_name(view.root_status)} [{leaves}] {signals}; {_pace(watch, now)}; {_losses(view)}"
+        f"tick {view.tick} {status_name(view.root_status)} [{leaves}] {signals}; {_pace(watch, now)}{_bus(view)}; "
+        f"{_losses(view)}"
     )
 
 
@@ -128,6 +129,7 @@ def _footer(watch: Watch, now: float) -> Text:
         (f"tick {view.tick}  ", "bold"),
         (f"{status_name(view.root_status)}  ", _STYLES[Status(view.root_status)]),
         (_pace(watch, now), "bold red" if watch.silent_for(now) is not None else ""),
+        (_bus(view), "bold red"),
         "; ",
         (_losses(view), "" if lossless else "red"),
     )
@@ -146,8 +148,17 @@ def _losses(view: TreeView) -> str:
         text += f", {view.restarts} restarts"
     if view.health is not None:
         health = view.health
-        text += f"; controller: {health.rx_rejected} refused, {health.tx_dropped} not sent, {health.faults} faults"
+        unknown = "unknown filtered" if health.unknown is None else f"{health.unknown} unknown"
+        text += (
+            f"; controller: {health.rx_rejected} refused, {unknown}, {health.tx_dropped} not sent, "
+            f"{health.faults} faults"
+        )
     return text
+
+
+def _bus(view: TreeView) -> str:
+    """The state of the bus where it is not as it should be, else nothing."""
+    return f"; bus {view.bus.text()}" if view.bus is not None and not view.bus.is_good else ""
 
 
 class Display(Protocol):

@@ -8,7 +8,7 @@ from typing import Any
 
 from canopy.model import Model, ModelError
 from canopy.signals import SignalTable
-from canopy.trace import Health, TraceDecoder, TreeView, status_name
+from canopy.trace import CAN_STATES, Health, TraceDecoder, TreeView, status_name
 
 _RATE_WINDOW_S = 2.0
 _SILENT_PERIODS = 10  # as the heartbeat's own timeout: ten missed CanopyTick
@@ -71,6 +71,7 @@ class Watch:
         """All that is known, as an object for JSON."""
         view = self.view
         health = (view.health if view else None) or Health()
+        bus = view.bus if view else None
         signals: dict[str, dict[str, float | str | None]] = {}
         for reading in self.signals.readings(now):
             signals.setdefault(reading.message, {})[reading.signal] = reading.value
@@ -96,9 +97,12 @@ class Watch:
             "refused": (view.refused if view else 0) + self.signals.refused,
             "restarts": view.restarts if view else 0,
             "rx_rejected": health.rx_rejected,
-            "rx_unknown": health.rx_unknown,
+            "rx_unknown": health.unknown,
             "tx_dropped": health.tx_dropped,
             "faults": health.faults,
+            "bus": CAN_STATES[bus.can_state] if bus else None,
+            "overload": bus.overload if bus else None,
+            "returning": bus.returning if bus else None,
         }
 
     def _take(self, views: tuple[TreeView, ...], now: float) -> tuple[TreeView, ...]:

@@ -4,13 +4,21 @@
 
 #include <stddef.h>
 
-/** Order of the table: standard ids before extended ones. The driver's error frames are behind all: no message is one. */
-static uint32_t rank(uint32_t id, uint8_t flags)
-{
-    uint32_t extended = (flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
-    uint32_t error = (flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
+#define MS UINT32_C(1000) /* [us] */
 
-    return id | extended | error;
+/** Order of the table: standard ids before extended ones. */
+static uint32_t rank(const canopy_rx_message_t *message)
+{
+    return message->id | ((message->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u);
+}
+
+/** The rank that a message must have to be this frame. The driver's error frames are behind all: no message is one. */
+static uint32_t rank_of(const canopy_can_frame_t *frame)
+{
+    uint32_t extended = (frame->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
+    uint32_t error = (frame->flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
+
+    return frame->id | extended | error;
 }
 
 static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
@@ -21,13 +29,13 @@ static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
     while (low < high) {
         uint16_t middle = (uint16_t)((low + high) / 2u);
 
-        if (rank(bus->rx[middle].id, bus->rx[middle].flags) < wanted) {
+        if (rank(&bus->rx[middle]) < wanted) {
             low = (uint16_t)(middle + 1u);
         } else {
             high = middle;
         }
     }
-    if (low < bus->rx_count && rank(bus->rx[low].id, bus->rx[low].flags) == wanted) {
+    if (low < bus->rx_count && rank(&bus->rx[low]) == wanted) {
         return low;
     }
     return bus->rx_count;
@@ -51,9 +59,29 @@ uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_
     return result;
 }
 
+/** Age of a frame, in whole ms, rounded up; CANOPY_AGE_MAX at most. */
+static uint16_t age_in_ms(canopy_time_t now, canopy_time_t arrived)
+{
+    canopy_time_t age = now - arrived;
+
+    if (!canopy_time_reached(now, arrived)) {
+        return 0; /* it has come since the cycle began */
+    }
+    /* In 32 bits: there is a divider for them. */
+    return age <= MS * (CANOPY_AGE_MAX - 1u) ? (uint16_t)(((uint32_t)age + MS - 1u) / MS) : CANOPY_AGE_MAX;
+}
+
+/** Notes when the values arrived that are in the input image now. What is not told in whole ms is not known. */
+static void note_arrival(canopy_rx_state_t *state, const canopy_rx_message_t *message, uint16_t age, canopy_time_t now)
+{
+    state->age_ms = age;
+    state->arrived_at = now - MS * age;
+    state->received = age < CANOPY_AGE_MAX || message->timeout == 0u;
+}
+
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
 {
-    uint16_t index = find(self->bus, rank(frame->id, frame->flags));
+    uint16_t index = find(self->bus, rank_of(frame));
     const canopy_rx_message_t *message;
     canopy_rx_state_t *state;
 
@@ -64,6 +92,7 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
     message = &self->bus->rx[index];
     state = &self->rx[index];
     self->taken++;
+    state->taken = true;
     if (!form_fits(message, frame)) {
         canopy_count(&self->counters.wrong_form);
         return;
@@ -83,49 +112,62 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
         return;
     }
     canopy_count(&self->counters.accepted);
-    state->received_at = now;
-    state->received = true;
+    note_arrival(state, message, age_in_ms(now, frame->time), now);
 }
 
-void canopy_bus_begin_tick(canopy_bus_state_t *self, canopy_time_t now)
+/** What a replay must know of a message in this tick goes into the check. */
+static void check_age(canopy_bus_state_t *self, uint16_t age_ms)
+{
+    const uint8_t age[2] = {(uint8_t)(age_ms & 0xFFu), (uint8_t)(age_ms >> 8)};
+
+    self->check = canopy_bus_check(self->check, 0, age, sizeof age);
+}
+
+static void begin_message(canopy_bus_state_t *self, uint16_t index, canopy_time_t now)
+{
+    const canopy_rx_message_t *message = &self->bus->rx[index];
+    canopy_rx_state_t *state = &self->rx[index];
+    bool in_time = message->timeout == 0u || !canopy_time_reached(now, state->arrived_at + message->timeout);
+    bool fresh = state->received && in_time;
+
+    if (state->fresh && !fresh) {
+        canopy_count(&self->counters.timeouts);
+    }
+    state->received = fresh;
+    state->fresh = fresh;
+    message->set_age(self->input, fresh, fresh ? age_in_ms(now, state->arrived_at) : CANOPY_AGE_MAX);
+    if (state->taken) {
+        check_age(self, state->age_ms);
+    }
+    state->taken_then = state->taken;
+    state->taken = false;
+}
+
+void canopy_bus_begin_tick(canopy_bus_state_t *self, const canopy_cycle_t *cycle)
 {
     for (uint16_t index = 0; index < self->bus->rx_count; index++) {
-        const canopy_rx_message_t *message = &self->bus->rx[index];
-        canopy_rx_state_t *state = &self->rx[index];
-        bool in_time = message->timeout == 0u || !canopy_time_reached(now, state->received_at + message->timeout);
-        bool fresh = state->received && in_time;
-
-        if (state->fresh && !fresh) {
-            canopy_count(&self->counters.timeouts);
-        }
-        state->received = fresh;
-        state->fresh = fresh;
-        message->set_fresh(self->input, fresh);
+        begin_message(self, index, cycle->now);
     }
-    self->bus->set_now(self->input, now);
+    self->check = canopy_bus_check(self->check, (uint32_t)cycle->can_state | (cycle->overload ? 8u : 0u), NULL, 0);
+    self->bus->set_cycle(self->input, cycle);
     self->bus->reset_output(self->output);
 }
 
-void canopy_bus_commit(canopy_bus_state_t *self, const canopy_can_t *can, uint32_t tick)
+void canopy_bus_commit(const canopy_bus_state_t *self, canopy_tx_t *tx, uint32_t tick, canopy_time_t now)
 {
     for (uint16_t index = 0; index < self->bus->tx_count; index++) {
         const canopy_tx_message_t *message = &self->bus->tx[index];
-        canopy_can_frame_t frame;
 
-        if (tick % message->every != 0u) {
-            continue;
+        if (tick % message->every == 0u) {
+            canopy_tx_post(tx, index, self->output, now + message->deadline);
         }
-        frame.id = message->id;
-        frame.flags = message->flags;
-        frame.length = message->length;
-        message->encode(self->output, frame.data);
-        if (message->data_id != CANOPY_E2E_NONE) {
-            uint8_t counter = self->tx_counters[index];
+    }
+}
 
-            canopy_e2e_protect((uint16_t)message->data_id, counter, frame.data, frame.length);
-            self->tx_counters[index] = (uint8_t)((counter + 1u) % CANOPY_E2E_COUNTERS);
-        }
-        canopy_count(can->send(can->context, &frame) == 1 ? &self->counters.sent : &self->counters.tx_dropped);
+void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until)
+{
+    for (uint16_t index = 0; index < self->bus->tx_count; index++) {
+        canopy_tx_post(tx, index, self->output, until);
     }
 }
 

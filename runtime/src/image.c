@@ -269,11 +269,12 @@ static canopy_error_t exchange(const canopy_image_app_t *self, canopy_loop_t *lo
     const canopy_app_t *app = self->app;
     const canopy_tree_t *tree = slot != 0u ? &self->state->trees[slot - 1u] : app->tree;
     const uint32_t faults = app->tree_instance->faults;
+    canopy_error_t error;
 
     if (loop->config->app != app) {
         return CANOPY_ERROR_ARGUMENT;
     }
-    canopy_loop_stop(loop, now);
+    error = canopy_loop_stop(loop, now);
     app->start(app->memory);
     self->state->running = slot;
     (void)canopy_tree_init(app->tree_instance, tree, app->status, app->words, app->memory);
@@ -282,7 +283,7 @@ static canopy_error_t exchange(const canopy_image_app_t *self, canopy_loop_t *lo
     for (uint16_t node = 0; node < tree->node_count; node++) {
         app->sent[node] = (uint8_t)CANOPY_IDLE;
     }
-    return CANOPY_OK;
+    return error;
 }
 
 canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now)
@@ -290,7 +291,7 @@ canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *l
     uint8_t slot = self->state->loaded;
     canopy_error_t error = slot != 0u ? exchange(self, loop, now, slot) : CANOPY_ERROR_NOT_FOUND;
 
-    if (error == CANOPY_OK) {
+    if (error == CANOPY_OK || error == CANOPY_ERROR_BUS_DOWN) {
         self->state->loaded = 0;
     }
     return error;

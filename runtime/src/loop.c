@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-enum { RX_MAX_DEFAULT = 64, LATENESS_FIRST_US = 16 };
+enum { LATENESS_FIRST_US = 16, STOP_WAIT_US = 1000, STOP_POLLS_MAX = 100000 };
 
 static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t detail)
 {
@@ -19,19 +19,15 @@ static bool is_complete(const canopy_loop_config_t *config)
 
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
            app->trace != NULL && app->bus_state != NULL && app->input != NULL && app->output != NULL &&
-           (app->rx != NULL || app->bus->rx_count == 0u) && (app->tx_counters != NULL || app->bus->tx_count == 0u) &&
-           app->trace_state != NULL && app->sent != NULL;
+           (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->trace_state != NULL &&
+           app->sent != NULL && app->rx_max > 0u && app->frame_us > 0u;
 }
 
 static void start_bus(const canopy_app_t *app)
 {
-    *app->bus_state = (canopy_bus_state_t){
-        .bus = app->bus, .input = app->input, .output = app->output, .rx = app->rx, .tx_counters = app->tx_counters};
+    *app->bus_state = (canopy_bus_state_t){.bus = app->bus, .input = app->input, .output = app->output, .rx = app->rx};
     for (uint16_t index = 0; index < app->bus->rx_count; index++) {
         app->rx[index] = (canopy_rx_state_t){0};
-    }
-    for (uint16_t index = 0; index < app->bus->tx_count; index++) {
-        app->tx_counters[index] = 0;
     }
 }
 
@@ -53,6 +49,9 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
     }
     app = config->app;
     error = canopy_tree_init(app->tree_instance, app->tree, app->status, app->words, app->memory);
+    if (error == CANOPY_OK) {
+        error = canopy_tx_init(app->tx, app->bus->tx, app->bus->tx_count, &app->tx_memory, config->can);
+    }
     if (error != CANOPY_OK) {
         return error;
     }
@@ -65,14 +64,14 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
     return CANOPY_OK;
 }
 
-/** Takes what has arrived, at most rx_max frames. */
-static void drain(canopy_loop_t *self, canopy_time_t now)
+/** Takes what has arrived, at most rx_max frames. @return true: more may be waiting. */
+static bool drain(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_can_t *can = self->config->can;
-    uint16_t most = self->config->rx_max != 0u ? self->config->rx_max : (uint16_t)RX_MAX_DEFAULT;
+    uint32_t most = self->config->rx_max != 0u ? self->config->rx_max : self->config->app->rx_max;
     canopy_can_frame_t frame;
 
-    for (uint16_t taken = 0; taken < most; taken++) {
+    for (uint32_t taken = 0; taken < most; taken++) {
         int result = can->receive(can->context, &frame);
 
         if (result < 0) {
@@ -80,31 +79,149 @@ static void drain(canopy_loop_t *self, canopy_time_t now)
             report(self, CANOPY_FAULT_CAN_RECEIVE, (uint32_t)-result);
         }
         if (result <= 0) {
-            return;
+            return false;
         }
         canopy_bus_receive(self->config->app->bus_state, &frame, now);
     }
-    canopy_count(&self->rx_backlogs);
+    return true;
+}
+
+/** Has more come than is taken for more than one cycle? Accounts for it. */
+static bool backlog_lasts(canopy_loop_t *self, bool backlog)
+{
+    bool lasts = backlog && self->backlog;
+
+    if (backlog) {
+        canopy_count(&self->rx_backlogs);
+    }
+    if (lasts) {
+        report(self, CANOPY_FAULT_RX_BACKLOG, self->rx_backlogs);
+    }
+    self->backlog = backlog;
+    return lasts;
+}
+
+/** Has the driver lost received frames since the last cycle? Accounts for them. */
+static bool has_lost(canopy_loop_t *self)
+{
+    const canopy_can_t *can = self->config->can;
+    canopy_can_stats_t stats;
+    uint32_t lost;
+
+    if (can->stats == NULL) {
+        return false;
+    }
+    can->stats(can->context, &stats);
+    lost = stats.rx_dropped - self->rx_lost;
+    if (lost == 0u) {
+        return false;
+    }
+    self->rx_lost = stats.rx_dropped;
+    report(self, CANOPY_FAULT_RX_LOST, lost);
+    return true;
+}
+
+static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
+{
+    canopy_tx_counters_t counters;
+    uint32_t late;
+
+    if (self->can_manager.state != before) {
+        report(self, CANOPY_FAULT_CAN_STATE, (uint32_t)self->can_manager.state);
+    }
+    canopy_tx_count(self->config->app->tx, &counters);
+    late = canopy_sum(counters.expired, counters.replaced); /* a value that is replaced was not out in its cycle */
+    if (late != self->tx_expired) {
+        report(self, CANOPY_FAULT_TX_EXPIRED, late - self->tx_expired);
+        self->tx_expired = late;
+    }
+}
+
+/** What was decided for a bus that was not there must not be the first thing on it: safe values, until they are out. */
+static bool is_returning(const canopy_loop_t *self)
+{
+    return canopy_can_is_unusable(self->can_manager.state) ||
+           (self->returning && !canopy_tx_is_out(self->config->app->tx));
+}
+
+/** In a replay the bus is what it was. */
+static void take_recorded_conditions(canopy_loop_t *self, canopy_cycle_t *cycle)
+{
+    const canopy_can_t *can = self->config->can;
+    canopy_can_conditions_t conditions;
+
+    if (can->conditions != NULL) {
+        can->conditions(can->context, &conditions);
+        cycle->overload = conditions.overload;
+        cycle->can_state = (canopy_can_state_t)conditions.can_state;
+        self->can_manager.state = cycle->can_state;
+        self->returning = conditions.returning;
+    }
+}
+
+/** What this tick works with: frames, time, and the state of the bus. */
+static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
+{
+    const canopy_app_t *app = self->config->app;
+    canopy_can_state_t before = self->can_manager.state;
+    canopy_cycle_t cycle = {.now = now};
+    bool lasts;
+    bool lost;
+
+    if (canopy_tx_is_busy(app->tx)) {
+        canopy_tx_kick(app->tx, now); /* what is past its deadline must not leave while this tick is worked out */
+    }
+    lasts = backlog_lasts(self, drain(self, now));
+    lost = has_lost(self);
+    cycle.overload = lasts || lost;
+    cycle.can_state =
+        canopy_can_manager_step(&self->can_manager, self->config->can, canopy_tx_is_blocked(app->tx), now);
+    self->returning = is_returning(self);
+    take_recorded_conditions(self, &cycle);
+    account_for_bus(self, before);
+    return cycle;
+}
+
+/** Posts what the tree wants, or the safe values of all messages while the bus is returning. */
+static void write_outputs(canopy_loop_t *self, canopy_time_t now)
+{
+    const canopy_app_t *app = self->config->app;
+
+    if (self->returning) {
+        app->bus->reset_output(app->output);
+        canopy_bus_commit_all(app->bus_state, app->tx, now + app->period);
+    } else {
+        canopy_bus_commit(app->bus_state, app->tx, self->ticks, now);
+    }
+}
+
+static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_status_t root)
+{
+    const canopy_app_t *app = self->config->app;
+
+    canopy_trace_send(app->trace, app->trace_state, app->tree_instance, app->tx,
+                      &(canopy_trace_tick_t){.tick = self->ticks,
+                                             .root = root,
+                                             .overruns = self->overruns,
+                                             .cycle = cycle,
+                                             .bus = app->bus_state,
+                                             .returning = self->returning,
+                                             .until = cycle->now + CANOPY_TRACE_PERIODS * app->period,
+                                             .is_filtered = self->config->can->is_filtered});
 }
 
 canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
     uint32_t faults = app->tree_instance->faults;
+    canopy_cycle_t cycle = read_inputs(self, now);
     canopy_status_t root;
 
-    drain(self, now);
-    canopy_bus_begin_tick(app->bus_state, now);
+    canopy_bus_begin_tick(app->bus_state, &cycle);
     root = canopy_tree_tick(app->tree_instance, now);
-    canopy_bus_commit(app->bus_state, self->config->can, self->ticks);
-    canopy_trace_send(app->trace, app->trace_state, app->tree_instance, self->config->can,
-                      &(canopy_trace_tick_t){.tick = self->ticks,
-                                             .root = root,
-                                             .overruns = self->overruns,
-                                             .now = now,
-                                             .taken = app->bus_state->taken,
-                                             .check = app->bus_state->check},
-                      &app->bus_state->counters);
+    write_outputs(self, now);
+    send_trace(self, &cycle, root);
+    canopy_tx_kick(app->tx, now);
     self->ticks++;
     if (app->tree_instance->faults != faults) {
         report(self, CANOPY_FAULT_LEAF_STATUS, app->tree_instance->fault_node);
@@ -152,13 +269,43 @@ static bool account_for_end(canopy_loop_t *self, canopy_time_t started, canopy_t
     return false;
 }
 
-void canopy_loop_stop(canopy_loop_t *self, canopy_time_t now)
+/**
+ * Serves the transmit side until everything is out, the trace behind the commands too, or the time is over.
+ * @return true: every command is out.
+ */
+static bool flush(canopy_loop_t *self, canopy_time_t until)
+{
+    const canopy_loop_config_t *config = self->config;
+    const canopy_can_t *can = config->can;
+    canopy_tx_t *tx = config->app->tx;
+    canopy_time_t last = config->clock->now(config->clock->context);
+    canopy_time_t now = last;
+    uint32_t standing = 0; /* polls in a row at which the clock did not move: some only move between cycles */
+
+    canopy_tx_kick(tx, now);
+    while ((!canopy_tx_is_out(tx) || canopy_tx_is_busy(tx)) && !canopy_time_reached(now, until) &&
+           standing < (uint32_t)STOP_POLLS_MAX) {
+        if (can->wait != NULL) {
+            (void)can->wait(can->context, STOP_WAIT_US);
+        }
+        now = config->clock->now(config->clock->context);
+        standing = now == last ? standing + 1u : 0u;
+        last = now;
+        canopy_tx_kick(tx, now);
+    }
+    return canopy_tx_is_out(tx);
+}
+
+canopy_error_t canopy_loop_stop(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
+    canopy_time_t stop_us = self->config->stop_us != 0u ? self->config->stop_us : CANOPY_LOOP_STOP_US;
+    canopy_cycle_t cycle = {.now = now, .can_state = self->can_manager.state};
 
-    canopy_bus_begin_tick(app->bus_state, now);
+    canopy_bus_begin_tick(app->bus_state, &cycle);
     canopy_tree_halt(app->tree_instance);
-    canopy_bus_commit(app->bus_state, self->config->can, 0);
+    canopy_bus_commit_all(app->bus_state, app->tx, now + stop_us);
+    return flush(self, now + stop_us) ? CANOPY_OK : CANOPY_ERROR_BUS_DOWN;
 }
 
 bool canopy_loop_step(canopy_loop_t *self)
@@ -188,20 +335,74 @@ static canopy_loop_t *next_of(canopy_loop_t *const *loops, uint16_t count)
     return next;
 }
 
-void canopy_loop_run_all(canopy_loop_t *const *loops, uint16_t count)
+/** Has it frames that wait for the bus, and no interrupt that sends them? */
+static bool must_be_served(const canopy_loop_t *loop)
+{
+    return loop->config->can->request == NULL && canopy_tx_is_busy(loop->config->app->tx);
+}
+
+/** How long to wait before those are served that must be: the shortest frame; 0: none must be. */
+static canopy_time_t pause_of(canopy_loop_t *const *loops, uint16_t count)
+{
+    canopy_time_t pause = 0;
+
+    for (uint16_t index = 0; index < count; index++) {
+        canopy_time_t frame_us = loops[index]->config->app->frame_us;
+
+        if (must_be_served(loops[index]) && (pause == 0u || frame_us < pause)) {
+            pause = frame_us;
+        }
+    }
+    return pause;
+}
+
+static void serve(canopy_loop_t *const *loops, uint16_t count, canopy_time_t now)
+{
+    for (uint16_t index = 0; index < count; index++) {
+        if (must_be_served(loops[index])) {
+            canopy_tx_service(loops[index]->config->app->tx, now);
+        }
+    }
+}
+
+/** Waits for a deadline, and sends meanwhile. @return as the clock's wait_until(). */
+static bool wait_until(canopy_loop_t *const *loops, uint16_t count, canopy_time_t deadline)
 {
     const canopy_clock_t *clock = loops[0]->config->clock;
+    canopy_time_t pause;
+
+    while ((pause = pause_of(loops, count)) != 0u) {
+        canopy_time_t next = clock->now(clock->context) + pause;
+
+        if (canopy_time_reached(next, deadline)) {
+            break;
+        }
+        if (!clock->wait_until(clock->context, next)) {
+            return false;
+        }
+        serve(loops, count, clock->now(clock->context));
+    }
+    return clock->wait_until(clock->context, deadline);
+}
+
+canopy_error_t canopy_loop_run_all(canopy_loop_t *const *loops, uint16_t count)
+{
+    const canopy_clock_t *clock = loops[0]->config->clock;
+    canopy_error_t result = CANOPY_OK;
     canopy_loop_t *next;
 
     do {
         next = next_of(loops, count);
-    } while (clock->wait_until(clock->context, next->deadline) && canopy_loop_step(next));
+    } while (wait_until(loops, count, next->deadline) && canopy_loop_step(next));
     for (uint16_t index = 0; index < count; index++) {
-        canopy_loop_stop(loops[index], clock->now(clock->context));
+        canopy_error_t error = canopy_loop_stop(loops[index], clock->now(clock->context));
+
+        result = result != CANOPY_OK ? result : error;
     }
+    return result;
 }
 
-void canopy_loop_run(canopy_loop_t *self)
+canopy_error_t canopy_loop_run(canopy_loop_t *self)
 {
-    canopy_loop_run_all(&self, 1);
+    return canopy_loop_run_all(&self, 1);
 }

@@ -4,7 +4,8 @@
 
 #include <stddef.h>
 
-enum { SNAPSHOT_NODES = 10, NO_NODE = 0xFFFF, NO_STATUS = 15 };
+enum { SNAPSHOT_NODES = 10, NO_NODE = 0xFFFF, NO_STATUS = 15, ARRIVALS = 3, FILTERED = 0xFFFF };
+enum { OVERLOAD_BIT = 8, RETURNING_BIT = 0x40 }; /* of CanopyArrivals' first byte */
 
 static void put16(uint8_t *data, uint32_t value)
 {
@@ -17,19 +18,15 @@ static uint32_t at_most16(uint32_t value)
     return value < UINT16_MAX ? value : UINT16_MAX;
 }
 
-static void send(canopy_trace_state_t *self, const canopy_can_t *can, canopy_trace_id_t id, const uint8_t data[8])
-{
-    canopy_can_frame_t frame; /* not all zero: the other 56 bytes are nobody's */
+/** Where the frames of a tick go. */
+typedef struct {
+    canopy_tx_t *tx;
+    canopy_time_t until;
+} sink_t;
 
-    frame.id = id.id;
-    frame.flags = id.flags;
-    frame.length = 8;
-    for (unsigned byte = 0; byte < 8u; byte++) {
-        frame.data[byte] = data[byte];
-    }
-    if (can->send(can->context, &frame) != 1) {
-        canopy_count(&self->tx_dropped);
-    }
+static void send(const sink_t *sink, canopy_trace_id_t id, const canopy_tx_trace_data_t *data)
+{
+    canopy_tx_trace(sink->tx, id.id, id.flags, data, sink->until);
 }
 
 /** How many nodes' statuses differ from what was sent, counted up to `most`. */
@@ -43,52 +40,90 @@ static uint32_t count_changes(const canopy_trace_state_t *self, const canopy_tre
     return changes;
 }
 
-static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_can_t *can,
+static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t *self, const sink_t *sink,
                       const canopy_trace_tick_t *tick, uint32_t changes)
 {
-    uint8_t data[8] = {self->sequence};
+    canopy_tx_trace_data_t data = {{self->sequence}};
 
-    put16(&data[1], tick->tick);
-    put16(&data[3], tick->tick >> 16);
-    data[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
-    data[6] = (uint8_t)changes;
-    data[7] = (uint8_t)(tick->overruns & 0xFFu);
+    put16(&data.byte[1], tick->tick);
+    put16(&data.byte[3], tick->tick >> 16);
+    data.byte[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
+    data.byte[6] = (uint8_t)changes;
+    data.byte[7] = (uint8_t)(tick->overruns & 0xFFu);
     self->sequence++;
-    send(self, can, config->tick, data);
+    send(sink, config->tick, &data);
 }
 
 /** What the tick worked with. Without a sequence number: there is one after each CanopyTick. */
-static void send_inputs(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_can_t *can,
-                        const canopy_trace_tick_t *tick)
+static void send_inputs(const canopy_trace_config_t *config, const sink_t *sink, const canopy_trace_tick_t *tick)
 {
-    uint8_t data[8];
+    canopy_time_t now = tick->cycle->now;
+    canopy_tx_trace_data_t data;
 
-    put16(&data[0], (uint32_t)(tick->now & 0xFFFFu));
-    put16(&data[2], (uint32_t)((tick->now >> 16) & 0xFFFFu));
-    put16(&data[4], (uint32_t)((tick->now >> 32) & 0xFFFFu));
-    data[6] = tick->taken;
-    data[7] = tick->check;
-    send(self, can, config->inputs, data);
+    put16(&data.byte[0], (uint32_t)(now & 0xFFFFu));
+    put16(&data.byte[2], (uint32_t)((now >> 16) & 0xFFFFu));
+    put16(&data.byte[4], (uint32_t)((now >> 32) & 0xFFFFu));
+    data.byte[6] = tick->bus->taken;
+    data.byte[7] = tick->bus->check;
+    send(sink, config->inputs, &data);
+}
+
+/**
+ * How old the messages were of which this tick took frames, and the state of the bus: three messages a frame, in the
+ * order of the table. Without messages, one frame when the state is not the one told last.
+ */
+static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_state_t *self, const sink_t *sink,
+                          const canopy_trace_tick_t *tick)
+{
+    const canopy_bus_state_t *bus = tick->bus;
+    unsigned conditions = (unsigned)tick->cycle->can_state | (tick->cycle->overload ? (unsigned)OVERLOAD_BIT : 0u) |
+                          (tick->returning ? (unsigned)RETURNING_BIT : 0u);
+    bool is_due = conditions != self->conditions;
+    unsigned filled = 0;
+    canopy_tx_trace_data_t data = {{0}};
+
+    self->conditions = (uint8_t)conditions;
+    data.byte[7] = (uint8_t)(tick->tick & 0xFFu);
+    for (uint16_t index = 0; index < bus->bus->rx_count; index++) {
+        if (!bus->rx[index].taken_then) {
+            continue;
+        }
+        if (filled == (unsigned)ARRIVALS) {
+            data.byte[0] = (uint8_t)(conditions | (filled << 4));
+            send(sink, config->arrivals, &data);
+            filled = 0;
+        }
+        put16(&data.byte[1u + 2u * filled], bus->rx[index].age_ms);
+        filled++;
+        is_due = true;
+    }
+    if (is_due) {
+        for (unsigned byte = 1u + 2u * filled; byte < 7u; byte++) {
+            data.byte[byte] = 0;
+        }
+        data.byte[0] = (uint8_t)(conditions | (filled << 4));
+        send(sink, config->arrivals, &data);
+    }
 }
 
 /** One CanopyChange frame with one or two nodes, whose statuses count as sent. */
 static void send_change(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                        const canopy_tree_instance_t *tree, const canopy_can_t *can, const uint16_t pair[2])
+                        const canopy_tree_instance_t *tree, const sink_t *sink, const uint16_t pair[2])
 {
-    uint8_t data[8] = {self->sequence};
+    canopy_tx_trace_data_t data = {{self->sequence}};
     unsigned status_b = pair[1] != (uint16_t)NO_NODE ? tree->status[pair[1]] : (unsigned)NO_STATUS;
 
-    put16(&data[1], pair[0]);
-    put16(&data[3], pair[1]);
-    data[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
-    data[6] = config->tree;
+    put16(&data.byte[1], pair[0]);
+    put16(&data.byte[3], pair[1]);
+    data.byte[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
+    data.byte[6] = config->tree;
     self->sequence++;
-    send(self, can, config->change, data);
+    send(sink, config->change, &data);
 }
 
 /** The first `changes` nodes whose statuses have changed, two a frame. */
 static void send_changes(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                         const canopy_tree_instance_t *tree, const canopy_can_t *can, uint32_t changes)
+                         const canopy_tree_instance_t *tree, const sink_t *sink, uint32_t changes)
 {
     uint16_t pair[2] = {NO_NODE, NO_NODE};
     unsigned filled = 0;
@@ -101,7 +136,7 @@ static void send_changes(const canopy_trace_config_t *config, canopy_trace_state
         pair[filled++] = node;
         changes--;
         if (filled == 2u || changes == 0u) {
-            send_change(config, self, tree, can, pair);
+            send_change(config, self, tree, sink, pair);
             pair[1] = NO_NODE;
             filled = 0;
         }
@@ -109,70 +144,77 @@ static void send_changes(const canopy_trace_config_t *config, canopy_trace_state
 }
 
 static void send_snapshot(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                          const canopy_tree_instance_t *tree, const canopy_can_t *can)
+                          const canopy_tree_instance_t *tree, const sink_t *sink)
 {
-    uint8_t data[8] = {self->sequence};
     uint16_t count = tree->tree->node_count;
+    canopy_tx_trace_data_t data;
 
-    put16(&data[1], self->next_node);
-    for (unsigned place = 0; place < SNAPSHOT_NODES; place++) {
+    data.byte[0] = self->sequence;
+    put16(&data.byte[1], self->next_node);
+    for (unsigned place = 0; place < SNAPSHOT_NODES; place += 2u) {
         uint32_t node = self->next_node + place;
-        unsigned code = node < count ? tree->status[node] : (unsigned)NO_STATUS;
+        unsigned low = node < count ? tree->status[node] : (unsigned)NO_STATUS;
+        unsigned high = node + 1u < count ? tree->status[node + 1u] : (unsigned)NO_STATUS;
 
-        data[3u + (place / 2u)] |= (uint8_t)(code << (4u * (place % 2u)));
+        data.byte[3u + (place / 2u)] = (uint8_t)(low | (high << 4));
     }
     self->next_node = self->next_node + (uint32_t)SNAPSHOT_NODES < count
                           ? (uint16_t)(self->next_node + (uint16_t)SNAPSHOT_NODES)
                           : 0u;
     self->sequence++;
-    send(self, can, config->snapshot, data);
+    send(sink, config->snapshot, &data);
 }
 
-static void send_health(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                        const canopy_tree_instance_t *tree, const canopy_can_t *can,
-                        const canopy_bus_counters_t *counters)
+static void send_health(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_instance_t *tree,
+                        const canopy_trace_tick_t *tick)
 {
-    uint8_t data[8];
+    const canopy_bus_counters_t *counters = &tick->bus->counters;
+    canopy_tx_counters_t tx;
+    canopy_tx_trace_data_t data;
 
-    put16(&data[0], at_most16(canopy_bus_rejected(counters)));
-    put16(&data[2], at_most16(counters->unknown_id));
-    put16(&data[4], at_most16(canopy_sum(counters->tx_dropped, self->tx_dropped)));
-    put16(&data[6], at_most16(tree->faults));
-    send(self, can, config->health, data);
+    canopy_tx_count(sink->tx, &tx);
+    put16(&data.byte[0], at_most16(canopy_bus_rejected(counters)));
+    put16(&data.byte[2], tick->is_filtered ? (uint32_t)FILTERED : at_most16(counters->unknown_id));
+    put16(&data.byte[4], at_most16(canopy_sum(canopy_sum(tx.expired, tx.replaced), tx.trace_dropped)));
+    put16(&data.byte[6], at_most16(tree->faults));
+    send(sink, config->health, &data);
 }
 
-static void send_model(const canopy_trace_config_t *config, canopy_trace_state_t *self, const canopy_tree_t *tree,
-                       const canopy_can_t *can)
+static void send_model(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_t *tree)
 {
-    uint8_t data[8] = {0};
+    canopy_tx_trace_data_t data = {{0}};
 
-    put16(&data[0], tree->hash);
-    put16(&data[2], tree->hash >> 16);
-    put16(&data[4], tree->node_count);
-    send(self, can, config->model, data);
+    put16(&data.byte[0], tree->hash);
+    put16(&data.byte[2], tree->hash >> 16);
+    put16(&data.byte[4], tree->node_count);
+    send(sink, config->model, &data);
 }
 
 void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                       const canopy_tree_instance_t *tree, const canopy_can_t *can, const canopy_trace_tick_t *tick,
-                       const canopy_bus_counters_t *counters)
+                       const canopy_tree_instance_t *tree, canopy_tx_t *tx, const canopy_trace_tick_t *tick)
 {
+    const sink_t target = {.tx = tx, .until = tick->until};
+    const sink_t *sink = &target;
     bool traces_nodes = config->change.id != CANOPY_TRACE_OFF;
     uint32_t changes = traces_nodes ? count_changes(self, tree, 2u * config->changes_max) : 0u;
 
     if (config->tick.id != CANOPY_TRACE_OFF) {
-        send_tick(config, self, can, tick, changes);
+        send_tick(config, self, sink, tick, changes);
     }
     if (config->inputs.id != CANOPY_TRACE_OFF) {
-        send_inputs(config, self, can, tick);
+        send_inputs(config, sink, tick);
     }
-    send_changes(config, self, tree, can, changes);
+    if (config->arrivals.id != CANOPY_TRACE_OFF) {
+        send_arrivals(config, self, sink, tick);
+    }
+    send_changes(config, self, tree, sink, changes);
     if (config->snapshot.id != CANOPY_TRACE_OFF) {
-        send_snapshot(config, self, tree, can);
+        send_snapshot(config, self, tree, sink);
     }
     if (config->health.id != CANOPY_TRACE_OFF && tick->tick % config->health_every == 0u) {
-        send_health(config, self, tree, can, counters);
+        send_health(config, sink, tree, tick);
     }
     if (config->model.id != CANOPY_TRACE_OFF && tick->tick % config->model_every == 0u) {
-        send_model(config, self, tree->tree, can);
+        send_model(config, sink, tree->tree);
     }
 }

@@ -20,6 +20,7 @@ static int receive(void *context, canopy_can_frame_t *frame)
         return 0;
     }
     taken++;
+    frame->time = now;
     frame->id = mailbox->id;
     frame->flags = mailbox->flags;
     frame->length = mailbox->length;
@@ -29,9 +30,10 @@ static int receive(void *context, canopy_can_frame_t *frame)
     return 1;
 }
 
-static int send(void *context, const canopy_can_frame_t *frame)
+static int send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     (void)frame;
     return 1;
 }
@@ -90,7 +92,9 @@ uint32_t bench_cycle_failures(void)
 {
     const canopy_app_t *app = config.app;
     const canopy_bus_counters_t *counters = &app->bus_state->counters;
+    canopy_tx_counters_t tx;
 
-    return cycles * bench_frame_count - counters->accepted + counters->tx_dropped + app->trace_state->tx_dropped +
+    canopy_tx_count(app->tx, &tx);
+    return cycles * bench_frame_count - counters->accepted + tx.replaced + tx.expired + tx.trace_dropped +
            app->tree_instance->faults + bench_loop.overruns + bench_loop.rx_errors;
 }

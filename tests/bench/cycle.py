@@ -19,7 +19,8 @@ PARTS = {
     "tick": ("canopy_tree_tick",),
     "commit": ("canopy_bus_commit",),
     "trace": ("canopy_trace_send",),
-    # In receive and commit, and there a second time.
+    "transmit": ("canopy_tx_service",),
+    # In receive and transmit, and there a second time.
     "e2e": ("canopy_e2e_check", "canopy_e2e_protect"),
 }
 

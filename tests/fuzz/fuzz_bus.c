@@ -13,13 +13,14 @@ enum { DATA_IDS = 3 };
 
 static input_t input;
 
-static void take_frame(canopy_can_frame_t *frame)
+static void take_frame(canopy_can_frame_t *frame, canopy_time_t now)
 {
     static const uint16_t data_ids[DATA_IDS] = {256, 272, 0};
     const canopy_rx_message_t *message = &nao_home_app.bus->rx[take8(&input) % nao_home_app.bus->rx_count];
     uint8_t kind = take8(&input);
 
     *frame = (canopy_can_frame_t){.id = message->id, .flags = message->flags, .length = message->length};
+    frame->time = kind % 4u == 0u ? now - take32(&input) : now; /* old, or just now, or yet to come */
     if (kind % 8u == 0u) {
         frame->id = take32(&input);
         frame->flags = take8(&input);
@@ -55,7 +56,7 @@ static void receive(canopy_time_t now)
     uint32_t accepted = counters->accepted;
     uint32_t all = accounted(counters);
 
-    take_frame(&frame);
+    take_frame(&frame, now);
     memcpy(&before, nao_home_input, sizeof before);
     canopy_bus_receive(nao_home_app.bus_state, &frame, now);
     EXPECT(accounted(counters) == all + 1u);
@@ -69,28 +70,108 @@ static int driver_receive(void *context, canopy_can_frame_t *frame)
     return take8(&input) % 8u == 0u ? CANOPY_ERROR_IO : 0;
 }
 
-static int driver_send(void *context, const canopy_can_frame_t *frame)
+/* A controller with two mailboxes: frames get out, come back or stay as the input says. */
+enum { MAILBOXES = 2 };
+
+static struct {
+    bool is_full;
+    bool is_aborting;
+} mailboxes[MAILBOXES];
+
+static int driver_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
+    int result = (int)(take8(&input) % 3u) - 1;
+
     (void)context;
+    EXPECT(mailbox < MAILBOXES && !mailboxes[mailbox].is_full);
     EXPECT(frame->length <= CANOPY_CAN_DATA_MAX);
-    return (int)(take8(&input) % 3u) - 1;
+    if (result == 1) {
+        mailboxes[mailbox].is_full = true;
+        mailboxes[mailbox].is_aborting = false;
+    }
+    return result;
 }
 
+static canopy_can_outcome_t driver_outcome(void *context, uint8_t mailbox)
+{
+    canopy_can_outcome_t outcome = (canopy_can_outcome_t)(take8(&input) % 3u);
+
+    (void)context;
+    EXPECT(mailbox < MAILBOXES && mailboxes[mailbox].is_full);
+    mailboxes[mailbox].is_full = outcome == CANOPY_CAN_PENDING;
+    return outcome;
+}
+
+static void driver_abort(void *context, uint8_t mailbox)
+{
+    (void)context;
+    EXPECT(mailbox < MAILBOXES && mailboxes[mailbox].is_full && !mailboxes[mailbox].is_aborting);
+    mailboxes[mailbox].is_aborting = true;
+}
+
+static canopy_can_controller_t driver_state(void *context)
+{
+    (void)context;
+    return (canopy_can_controller_t)(take8(&input) % (CANOPY_CAN_CONTROLLER_GONE + 1u));
+}
+
+static void driver_restart(void *context)
+{
+    (void)context;
+}
+
+static void driver_stats(void *context, canopy_can_stats_t *stats)
+{
+    (void)context;
+    *stats = (canopy_can_stats_t){.rx_dropped = take8(&input)};
+}
+
+/** Every command that was posted is in a mailbox, waits, or has ended once. */
+static void check_accounts(const canopy_app_t *app)
+{
+    canopy_tx_counters_t counters;
+    uint32_t posted = 0;
+    uint32_t open = 0;
+
+    canopy_tx_count(app->tx, &counters);
+    for (uint16_t message = 0; message < app->bus->tx_count; message++) {
+        const canopy_tx_slot_t *slot = &app->tx_memory.slots[message];
+
+        posted += slot->posted;
+        open += slot->posted - slot->taken; /* those that wait, and those that they will have replaced */
+        open += slot->flying ? 1u : 0u;
+    }
+    EXPECT(counters.sent + counters.replaced + counters.expired + open == posted);
+}
+
+static canopy_time_t clock_time;
+
+/** Moves on with each reading, so that a stop comes to its end. */
 static canopy_time_t driver_now(void *context)
 {
     (void)context;
-    return take32(&input);
+    clock_time += 1000u + take8(&input);
+    return clock_time;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const canopy_can_t can = {.receive = driver_receive, .send = driver_send};
+    static const canopy_can_t can = {.receive = driver_receive,
+                                     .send = driver_send,
+                                     .outcome = driver_outcome,
+                                     .abort = driver_abort,
+                                     .state = driver_state,
+                                     .restart = driver_restart,
+                                     .stats = driver_stats,
+                                     .mailboxes = MAILBOXES};
     static const canopy_clock_t clock = {.now = driver_now};
     static const canopy_loop_config_t config = {.app = &nao_home_app, .can = &can, .clock = &clock};
     canopy_loop_t loop;
     canopy_time_t now;
 
     input = (input_t){.next = data, .end = data + size};
+    clock_time = take32(&input) * UINT64_C(0xFFFFFFFF);
+    memset(mailboxes, 0, sizeof mailboxes);
     EXPECT(canopy_loop_init(&loop, &config) == CANOPY_OK);
     now = loop.deadline;
     while (input.next != input.end) {
@@ -103,8 +184,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
             EXPECT(root > CANOPY_IDLE && root <= CANOPY_SKIPPED);
         }
+        check_accounts(&nao_home_app);
         now += what * UINT64_C(1000);
     }
-    canopy_loop_stop(&loop, now);
+    (void)canopy_loop_stop(&loop, clock_time);
+    check_accounts(&nao_home_app);
     return 0;
 }

@@ -247,13 +247,14 @@ static bool never_wait(void *context, canopy_time_t deadline)
 static int receive(void *context, canopy_can_frame_t *frame)
 {
     (void)context;
-    *frame = (canopy_can_frame_t){.id = 256, .length = 2, .data = {take8(&input)}};
+    *frame = (canopy_can_frame_t){.time = time, .id = 256, .length = 2, .data = {take8(&input)}};
     return take8(&input) % 2u == 0u ? 1 : 0;
 }
 
-static int send(void *context, const canopy_can_frame_t *frame)
+static int send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     (void)frame;
     return 1;
 }

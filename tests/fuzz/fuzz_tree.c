@@ -225,9 +225,10 @@ static void make_tables(tables_t *tables)
 
 /* --- the run --------------------------------------------------------------------------------------------------------- */
 
-static int take_frame(void *context, const canopy_can_frame_t *frame)
+static int take_frame(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     EXPECT(frame->length == 8u);
     return take8(&input) % 3u == 0u ? 0 : 1;
 }
@@ -325,7 +326,10 @@ static void run(tables_t *tables)
     const canopy_can_t can = {.send = take_frame};
     const canopy_trace_config_t config = {
         .health_every = 3, .model_every = 2, .changes_max = (uint8_t)(1u + take8(&input) % 127u)};
-    const canopy_bus_counters_t counters = {.unknown_id = take32(&input)};
+    static const canopy_bus_t no_messages;
+    const canopy_bus_state_t bus = {.bus = &no_messages, .counters.unknown_id = take32(&input)};
+    canopy_tx_trace_t waiting[64];
+    canopy_tx_t tx;
     canopy_trace_state_t trace = {.sent = sent};
     canopy_time_t now = take32(&input) * UINT64_C(0xFFFFFFFF);
     uint16_t count = tables->tree.node_count;
@@ -339,6 +343,8 @@ static void run(tables_t *tables)
     status[count] = GUARD;
     words[tables->tree.word_count] = GUARD;
     instance = &self;
+    EXPECT(canopy_tx_init(&tx, NULL, 0, &(canopy_tx_memory_t){.trace = waiting, .trace_capacity = 64}, &can) ==
+           CANOPY_OK);
     EXPECT(canopy_tree_init(&self, &tables->tree, status, words, NULL) == CANOPY_OK);
     for (unsigned tick = 0; tick < (unsigned)TICKS_MAX && input.next != input.end; tick++) {
         uint8_t what = take8(&input);
@@ -349,8 +355,14 @@ static void run(tables_t *tables)
 
             EXPECT(root > CANOPY_IDLE && root <= CANOPY_SKIPPED);
             EXPECT(canopy_tree_status(&self, 0) == root);
-            canopy_trace_send(&config, &trace, &self, &can,
-                              &(canopy_trace_tick_t){.tick = tick, .root = root, .overruns = what}, &counters);
+            canopy_trace_send(&config, &trace, &self, &tx,
+                              &(canopy_trace_tick_t){.tick = tick,
+                                                     .root = root,
+                                                     .overruns = what,
+                                                     .cycle = &(canopy_cycle_t){.now = now},
+                                                     .bus = &bus,
+                                                     .until = now + 1u});
+            canopy_tx_service(&tx, now);
         } else if (what < 248u) {
             canopy_tree_halt(&self);
         } else {

@@ -7,23 +7,29 @@
  * write it: 123#1122, 00000123#1122 (extended), 123#R5 (remote), 123##5AABB (CAN FD, 5 = flags).
  *
  *   send FRAME          1, 0 or the error's number
+ *   outcome             of the frame sent last: pending, sent or aborted
+ *   state               of the controller, as a number
+ *   restart             "tried"
+ *   advice NUMBER       its text, or "none"
  *   burst COUNT FRAME   "taken T full F failed E"
  *   receive MS          the frame, "none" after MS milliseconds, or the error's number
  *   drain               number of frames that were waiting
  *   stats               all counters, name=value
- *   stamp               kernel's time stamp of the last frame [ns] (socketcan)
+ *   age                 of the frame received last, since it arrived [us]
  *   malformed           malformed datagrams (unixbus)
  */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "canopy/can/open.h"
 
 #define IDS_MAX 8
 
 static canopy_can_port_t port;
+static canopy_time_t arrived; /* the frame received last */
 
 /* candump's flags of a CAN FD frame */
 enum { FLAG_BITRATE_SWITCH = 1, FLAG_ERROR_STATE = 2 };
@@ -94,7 +100,10 @@ static void burst(unsigned long count, const canopy_can_frame_t *frame)
     unsigned long taken = 0;
     unsigned long full = 0;
     for (unsigned long i = 0; i < count; i++) {
-        const int result = port.can->send(port.can->context, frame);
+        const int result = port.can->send(port.can->context, 0, frame);
+        if (result == 1 && port.can->outcome != NULL) {
+            (void)port.can->outcome(port.can->context, 0);
+        }
         taken += result == 1;
         full += result == 0;
     }
@@ -109,6 +118,7 @@ static void receive(uint32_t timeout_ms)
         result = port.can->receive(port.can->context, &frame);
     }
     if (result == 1) {
+        arrived = frame.time;
         print_frame(&frame);
     } else if (result == 0) {
         printf("none\n");
@@ -125,6 +135,19 @@ static void drain(void)
         count++;
     }
     printf("%u\n", count);
+}
+
+static void print_age(void)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    printf("%" PRId64 "\n", (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000 - (int64_t)arrived);
+}
+
+static void print_outcome(void)
+{
+    static const char *const names[] = {"pending", "sent", "aborted"};
+    printf("%s\n", names[port.can->outcome != NULL ? port.can->outcome(port.can->context, 0) : CANOPY_CAN_SENT]);
 }
 
 static void print_stats(void)
@@ -149,7 +172,17 @@ static bool obey(const char *line)
     const char *argument = NULL;
     if (is_command(line, "send", &argument)) {
         const canopy_can_frame_t frame = parse_frame(argument);
-        printf("%d\n", port.can->send(port.can->context, &frame));
+        printf("%d\n", port.can->send(port.can->context, 0, &frame));
+    } else if (is_command(line, "outcome", &argument)) {
+        print_outcome();
+    } else if (is_command(line, "state", &argument)) {
+        printf("%d\n", (int)port.can->state(port.can->context));
+    } else if (is_command(line, "restart", &argument)) {
+        port.can->restart(port.can->context);
+        printf("tried\n");
+    } else if (is_command(line, "advice", &argument)) {
+        const char *advice = canopy_can_advice(&port, (unsigned)strtoul(argument, NULL, 10));
+        printf("%s\n", advice != NULL ? advice : "none");
     } else if (is_command(line, "burst", &argument)) {
         char *rest = NULL;
         const unsigned long count = strtoul(argument, &rest, 10);
@@ -161,8 +194,8 @@ static bool obey(const char *line)
         drain();
     } else if (is_command(line, "stats", &argument)) {
         print_stats();
-    } else if (is_command(line, "stamp", &argument) && port.kind == CANOPY_CAN_OPEN_SOCKETCAN) {
-        printf("%" PRIu64 "\n", port.driver.socketcan.last_frame_ns);
+    } else if (is_command(line, "age", &argument)) {
+        print_age();
     } else if (is_command(line, "malformed", &argument) && port.kind == CANOPY_CAN_OPEN_UNIXBUS) {
         printf("%" PRIu32 "\n", canopy_unixbus_malformed(&port.driver.unixbus));
     } else {
@@ -186,6 +219,7 @@ int main(int argument_count, char **arguments)
             acceptance.ids = ids;
         }
     }
+    acceptance.everything = acceptance.count == 0u;
     if (argument_count < 2 || canopy_can_open(&port, arguments[1], &acceptance, message, sizeof message) != CANOPY_OK) {
         (void)fprintf(stderr, "%s\n", argument_count < 2 ? "usage: can_probe SPEC [accept=ID,...] [errors]" : message);
         return EXIT_FAILURE;

@@ -85,7 +85,11 @@ def bus_harness(bus: Bus) -> str:
             lines += [f"    values[{place}] = {_get(signal, f'{member}.{signal.c_name}')};"]
             lines += [f"    has[{place}] = {f'{member}.{signal.has_name}' if signal.has_name else 'true'};"]
         # Stale: the flags of multiplexed signals are false again before the next frame.
-        lines += [f"    {bus.name}_bus.rx[{number}].set_fresh(&in, false);", "    return good ? 0 : -2;", "}"]
+        lines += [
+            f"    {bus.name}_bus.rx[{number}].set_age(&in, false, CANOPY_AGE_MAX);",
+            "    return good ? 0 : -2;",
+            "}",
+        ]
     for number, message in enumerate(bus.send):
         lines += [f"int encode_{number}(const int64_t *values, uint8_t *data, size_t size)", "{", "    (void)size;"]
         lines += ["    (void)values;", f"    {bus.name}_bus.reset_output(&out);", "    out.saturated = 0;"]

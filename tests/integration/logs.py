@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import random
 import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import can
@@ -19,8 +21,24 @@ from canopy.unixbus import HEADER, decode, encode
 from integration.sim_peers import DBC
 
 INPUTS_ID = 0x604
+ARRIVALS_ID = 0x606
 TICK_ID = 0x600
 PERIOD_US = 50_000
+BUS_STATES = [0] * 12 + [1, 2, 3, 0x08, 0x44, 0x45, 0x40]
+"""CanState, Overload, Returning, as in CanopyArrivals' first byte."""
+
+
+@dataclass
+class Step:
+    """What one tick is given."""
+
+    now: int
+    """Its time [us]."""
+    frames: list[can.Message]
+    ages: dict[int, int] = field(default_factory=dict)
+    """Of the frames with an id [ms]; 0 where none is given."""
+    conditions: int = 0
+    """As in CanopyArrivals' first byte."""
 
 
 def frame(identifier: int, data: bytes = b"", **more: bool) -> can.Message:
@@ -74,24 +92,36 @@ def read_frames(path: Path) -> list[can.Message]:
     return frames
 
 
-def run_program(program: Path, ticks: list[tuple[int, list[can.Message]]], folder: Path) -> list[list[can.Message]]:
-    """Gives a program frames at times [us], tick by tick; what it sends in each, and behind the last one at its end."""
+def record_of(steps: Sequence[Step]) -> list[can.Message]:
+    """A record, as drivers/include/canopy/clock/replay.h describes it."""
+    record = []
+    for step in steps:
+        record.append(frame(INPUTS_ID, step.now.to_bytes(6, "little") + bytes(2)))
+        record.append(frame(ARRIVALS_ID, bytes([step.conditions]) + bytes(7)))
+        for message in step.frames:
+            age = step.ages.get(message.arbitration_id, 0)
+            record.append(frame(ARRIVALS_ID, bytes([step.conditions | 0x10]) + age.to_bytes(2, "little") + bytes(5)))
+            record.append(message)
+    return record
+
+
+def run_program(program: Path, steps: Sequence[Step], folder: Path) -> list[list[can.Message]]:
+    """Gives a program frames, tick by tick; what it sends in each, and behind the last one at its end."""
     record, sent = folder / "made.record", folder / "made.sent"
     with record.open("wb") as file:
-        for now, frames in ticks:
-            for message in (frame(INPUTS_ID, now.to_bytes(6, "little") + bytes(2)), *frames):
-                file.write(encode(message))
+        for message in record_of(steps):
+            file.write(encode(message))
     command = [str(program), "--replay", str(record), "--sent", str(sent)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"{len(ticks)} ticks replayed" in done.stdout
+    assert f"{len(steps)} ticks replayed" in done.stdout
     result: list[list[can.Message]] = []
     for message in read_frames(sent):
         # PowerCommand is the first frame of a tick.
         if message.arbitration_id == 0x200:
             result.append([])
         result[-1].append(message)
-    assert len(result) == len(ticks) + 1
+    assert len(result) == len(steps) + 1
     return result
 
 
@@ -104,18 +134,25 @@ def make_log(
     """
     robot = Robot(seed)
     log = [robot.sensor(name) for _ in range(before) for name in ("Battery", "Posture")]
-    inputs: list[tuple[int, list[can.Message]]] = []
+    steps: list[Step] = []
     now = 123_456_789_012
     for tick in range(ticks):
-        inputs.append((now, robot.frames_of_a_tick(tick)))
+        step = Step(now, robot.frames_of_a_tick(tick), conditions=robot.random.choice(BUS_STATES))
+        step.ages = {number: robot.random.choice((0, 1, 3, 17, 49, 120, 499, 500, 65535)) for number in (0x100, 0x110)}
+        steps.append(step)
         now += PERIOD_US + robot.random.choice((0, 0, 0, 17, 999, 40_000, 3 * PERIOD_US))
-    sent = run_program(build_dir / "examples" / "nao" / name, inputs, folder)
+    sent = run_program(build_dir / "examples" / "nao" / name, steps, folder)
     late: list[can.Message] = []
-    for (_, frames), answer in zip(inputs, sent, strict=False):
+    for step, answer in zip(steps, sent, strict=False):
         early = robot.random.randint(0, 1)
-        log += late + frames[: len(frames) - early] + answer
-        late = frames[len(frames) - early :]
+        log += late + step.frames[: len(step.frames) - early] + answer
+        late = step.frames[len(step.frames) - early :]
     log += late + sent[-1]
+    return stamped(log)
+
+
+def stamped(log: list[can.Message]) -> list[can.Message]:
+    """The same log with times and a channel."""
     for number, message in enumerate(log):
         message.timestamp = 1000.0 + number / 1000
         message.channel = "can0"

@@ -100,6 +100,10 @@ def bus_codec(tmp_path_factory: pytest.TempPathFactory) -> Codec:
         "50",
         "--name",
         "random",
+        "--foreign-load",  # so many messages leave little to others
+        "0",
+        "--bitrate",
+        "1000000",
     ]
     result = CliRunner().invoke(main, ["compile", *arguments, "-o", str(folder)])
     assert result.exit_code == 0, result.output

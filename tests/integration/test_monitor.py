@@ -21,10 +21,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from canopy.canbus import open_bus
 from canopy.model import load_model
-from canopy.view import line, symbol
+from canopy.view import line, picture, symbol
 from canopy.watch import Watch
 from integration.trace_source import TraceSource, database, to_message, write_model
 
@@ -134,6 +135,37 @@ def test_a_terminal_gets_a_picture(tmp_path: Path, traffic: Callable[[], None]) 
     assert "\x1b[1;33m?  Get home" in picture  # RUNNING is bold yellow
     assert "\x1b[1;31mFAILURE" in picture
     assert text.endswith("\x1b[?25h")  # the cursor is there again
+
+
+def test_the_state_of_the_bus_and_of_the_filter_is_shown(tmp_path: Path) -> None:
+    watch, source = Watch(load_model(write_model(tmp_path))), TraceSource(4)
+
+    def feed(*frames: tuple[int, bytes]) -> tuple[str, dict[str, object]]:
+        tick, *rest = source.frames([1, 3, 1, 9])
+        for frame in (tick, *frames, *rest):
+            watch.feed(*frame, 1.0)
+        return line(watch, 1.0), watch.snapshot(1.0)
+
+    text, data = feed()
+    assert "; bus " not in text
+    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == (None, None, None, 0)
+    text, data = feed(source.arrivals(ages=[3]), source.health(RxUnknown=12))
+    assert "; bus " not in text
+    assert "0 refused, 12 unknown, 0 not sent" in text
+    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == ("error-active", False, False, 12)
+    text, data = feed(source.arrivals(state=2, overload=1), source.health(RxUnknown=65535, TxDropped=3))
+    assert "; bus error-passive, overload; " in text
+    assert "0 refused, unknown filtered, 3 not sent" in text
+    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == (
+        "error-passive",
+        True,
+        False,
+        None,
+    )
+    console = Console(width=160)
+    with console.capture() as capture:
+        console.print(picture(watch, 1.0, "title"))
+    assert "; bus error-passive, overload; " in capture.get()
 
 
 def test_silence_is_shown(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_the_model_names_the_trace_messages_of_its_node(build_dir: Path) -> None
     kinds = ("CanopyTick", "CanopyChange", "CanopySnapshot", "CanopyHealth")
     for name, first in (("driver", 0x600), ("navigator", 0x610)):
         data = json.loads(model_file(build_dir, name).read_text())
-        more = {"CanopyInputs": 0x614, "CanopyModel": 0x615} if name == "navigator" else {}
+        more = {"CanopyInputs": 0x614, "CanopyModel": 0x615, "CanopyArrivals": 0x616} if name == "navigator" else {}
         assert data["trace"] == {kind: first + place for place, kind in enumerate(kinds)} | more
         assert not any("Canopy" in message for message in data["bus"]["send"] + data["bus"]["receive"])
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from canopy.model import Model, load_model
-from canopy.trace import Health, Status, TraceDecoder, TreeView, status_name
+from canopy.trace import BusState, Health, Status, TraceDecoder, TreeView, status_name
 from integration.trace_source import IDS, Frame, TraceSource, write_model
 
 CODES = (0, 1, 2, 3, 4, 9, 10, 11, 12)
@@ -180,6 +180,28 @@ def test_health_is_taken_over(models: dict[int, Model]) -> None:
     assert feed(decoder, [health]) == []
     (view,) = feed(decoder, source.frames([1]))
     assert view.health == Health(65535, 2, 3, 4)
+    assert view.health.unknown == 2
+    assert Health(rx_unknown=65535).unknown is None
+
+
+def test_the_state_of_the_bus_is_told(models: dict[int, Model]) -> None:
+    source, decoder = TraceSource(1), TraceDecoder(models[1])
+    (view,) = feed(decoder, source.frames([1]))
+    assert view.bus is None
+    told = []
+    for state in range(7):
+        tick, *rest = source.frames([1])
+        (view,) = feed(decoder, [tick, source.arrivals(state, state % 2, state // 4, ages=[7] * (state % 4)), *rest])
+        assert view.bus == BusState(state, bool(state % 2), state >= 4)
+        assert view.bus.is_good == (state == 0)
+        told.append(view.bus.text())
+    assert told[0] == "error-active"
+    assert told[3:5] == ["blocked, overload", "bus-off, sends safe values"]
+    (view,) = feed(decoder, source.frames([1]))
+    assert view.bus == BusState(6, False, True)  # as it was
+    new = TraceSource(1)
+    (view,) = feed(decoder, new.frames([0]))
+    assert (view.restarts, view.bus, view.refused) == (1, None, 0)
 
 
 def test_what_is_no_trace_frame_of_this_model_is_refused_and_changes_nothing(models: dict[int, Model]) -> None:
@@ -196,6 +218,9 @@ def test_what_is_no_trace_frame_of_this_model_is_refused_and_changes_nothing(mod
         (IDS["CanopySnapshot"], bytes([0, 0, 0, 0, 0, 255, 255, 0])),  # a status behind the last node
         (IDS["CanopySnapshot"], bytes([0, 0, 0, 0, 0x60, 255, 255, 255])),  # no such status
         (IDS["CanopyHealth"], bytes(9)),
+        (IDS["CanopyArrivals"], bytes(7)),
+        (IDS["CanopyArrivals"], b"\x07" + bytes(7)),  # no such state of the bus
+        (IDS["CanopyArrivals"], b"\x80" + bytes(7)),  # not used
     ]
     for count, frame in enumerate(bad, 1):
         assert decoder.feed(*frame) == ()

@@ -21,6 +21,7 @@ IDS = {
     "CanopyHealth": 0x603,
     "CanopyInputs": 0x604,
     "CanopyModel": 0x605,
+    "CanopyArrivals": 0x606,
 }
 
 Frame = tuple[int, bytes]
@@ -102,6 +103,13 @@ class TraceSource:
     def inputs(self, now: int, taken: int, check: int) -> Frame:
         fields = {"Now": now, "Taken": taken, "Check": check}
         return IDS["CanopyInputs"], self._database.encode_message("CanopyInputs", fields)
+
+    def arrivals(self, state: int = 0, overload: int = 0, returning: int = 0, ages: Sequence[int] = ()) -> Frame:
+        fields = {"CanState": state, "Overload": overload, "Returning": returning, "Count": len(ages)}
+        fields |= {f"Age{place}": age for place, age in enumerate([*ages, 0, 0, 0][:3])}
+        return IDS["CanopyArrivals"], self._database.encode_message(
+            "CanopyArrivals", {**fields, "Tick": (self.tick - 1) % 256}
+        )
 
     def model(self, digits: int, nodes: int) -> Frame:
         return IDS["CanopyModel"], self._database.encode_message("CanopyModel", {"Hash": digits, "Nodes": nodes})

@@ -25,8 +25,8 @@ int main(int argc, char **argv)
     canopy_loop_config_t navigator_config = {.app = &navigator_app, .clock = &posix_clock.clock};
 
     if (argc != 2 || canopy_posix_stop_on_signals(&stop) != CANOPY_OK ||
-        canopy_can_open(&ports[0], argv[1], NULL, message, sizeof message) != CANOPY_OK ||
-        canopy_can_open(&ports[1], argv[1], NULL, message, sizeof message) != CANOPY_OK) {
+        canopy_can_open(&ports[0], argv[1], driver_app.acceptance, message, sizeof message) != CANOPY_OK ||
+        canopy_can_open(&ports[1], argv[1], navigator_app.acceptance, message, sizeof message) != CANOPY_OK) {
         fprintf(stderr, "%s\n", message);
         return 1;
     }

@@ -31,7 +31,9 @@ EXACT = ["-eva-slevel", "10000000", "-eva-split-return", "full"]
 # States are mixed at once: only so can tables of every size be looked at.
 ANY_TABLE = ["-eva-slevel", "2", "-eva-domains", "cvalue,equality,symbolic-locations"]
 ANY_TABLE += ["-eva-split-return-function", "canopy_tree_init:0,canopy_tree_validate:0"]
-LOOP = ["-eva-slevel", "20", "-eva-split-return-function", "receive:full", "-eva-slevel-function", "send_changes:2000"]
+# main() may mix its states: which hooks there are is one state. A mailbox is looked at by itself.
+LOOP = ["-eva-slevel", "20", "-eva-split-return-function", "receive:full,copy:0,find_mailbox:full,settle:full"]
+LOOP += ["-eva-slevel-function", "send_changes:2000,main:0,find_mailbox:500,collect:500", "-eva-min-loop-unroll", "4"]
 
 
 @dataclass
@@ -52,9 +54,11 @@ class Run:
         include = [*self.include, "runtime/include", "runtime/src"]
         cpp = [f"-I{folder}" for folder in include] + [f"-D{define}" for define in self.defines]
         if self.wp:
-            cpp = ["-nostdinc", f"-I{HERE}/include", *cpp, f"-I{share.strip()}/libc"]
+            cpp = ["-nostdinc", f"-I{HERE}/include", f"-I{HERE}/include/atomics", *cpp, f"-I{share.strip()}/libc"]
             prove = ["-wp", "-wp-rte", *self.options, "-wp-prover", "z3,cvc4", "-wp-timeout", "60"]
             return [*FRAMA_C, "-no-frama-c-stdlib", f"-cpp-extra-args={' '.join(cpp)}", *prove, *self.sources]
+        # Frama-C's own <stdatomic.h> says nothing of what its functions do.
+        cpp += ["-D__FC_STDATOMIC", "-include", f"{HERE}/include/atomics/stdatomic.h"]
         show = ["-eva", "-eva-no-show-progress"]
         return [*FRAMA_C, f"-cpp-extra-args={' '.join(cpp)}", *show, *self.options, *self.sources]
 
@@ -98,7 +102,9 @@ def all_runs(every_inner: bool) -> list[Run]:
         )
         for name in sorted(types, key=lambda name: name not in heavy)
     ]
-    loop = [f"runtime/src/{part}.c" for part in ("tree", "bus", "loop", "trace", "e2e")]
+    loop = [
+        f"runtime/src/{part}.c" for part in ("tree", "bus", "can_state", "loop", "trace", "tx", "tx_service", "e2e")
+    ]
     generated = [str(path) for path in sorted(application.glob("*.c"))]
     runs += [
         Run("wp ring, time", [f"{HERE}/wp_arithmetic.c", "runtime/src/ring.c"], ["-wp-model", "Typed+Cast"], wp=True),
@@ -109,8 +115,9 @@ def all_runs(every_inner: bool) -> list[Run]:
         Run("wp shapes", [f"{HERE}/wp_validate.c"], ["-wp-fct", "shapes_of_nodes_def"], wp=True),
         Run("wp walks", [f"{HERE}/wp_walks.c"],
             ["-wp-fct", "canopy_count_children,canopy_parallel_open_child,canopy_try_catch_handler"], wp=True),
-        Run("loop, bus, trace", [f"{HERE}/eva_loop.c", *loop, *generated, "examples/nao/home_leaves.c"], LOOP,
-            include=[str(application)]),
+        *(Run(name, [f"{HERE}/eva_loop.c", *loop, *generated, "examples/nao/home_leaves.c"], LOOP,
+              include=[str(application)], defines=defines)
+          for name, defines in (("loop, bus, trace", []), ("loop, bus, mailboxes", ["MAILBOXES"]))),
         Run("e2e, time", [f"{HERE}/eva_e2e.c", "runtime/src/e2e.c"],
             ["-eva-precision", "6"]),
         Run("any table", [f"{HERE}/eva_table.c", *ENGINE], ANY_TABLE),

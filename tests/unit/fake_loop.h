@@ -34,13 +34,16 @@ static inline void fake_loop_start(const canopy_app_t *app)
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fake_loop_config));
 }
 
-/** A cycle, one period after the last one: it gets the first `frames` of fake.rx, and fake.tx is what it sends. */
+/** A cycle, one period after the last one: it gets the first `frames` of fake.rx, just arrived; fake.tx is what it sends. */
 static inline canopy_status_t fake_loop_cycle(unsigned frames)
 {
     fake.rx_count = frames;
     fake.rx_taken = 0;
     fake.tx_count = 0;
     time += fake_loop_config.app->period;
+    for (unsigned frame = 0; frame < frames; frame++) {
+        fake.rx[frame].time = time;
+    }
     return canopy_loop_cycle(&loop, time);
 }
 

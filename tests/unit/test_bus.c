@@ -3,30 +3,35 @@
 #include <string.h>
 
 #include "canopy/bus.h"
-#include "canopy/signal.h"
-#include "canopy/tree.h"
 #include "fake_can.h"
 #include "unity.h"
 
 typedef struct {
     canopy_time_t now;
+    canopy_can_state_t can_state;
+    bool overload;
     uint8_t speed;
     bool speed_fresh;
+    uint16_t speed_age;
     uint8_t plain;
     bool plain_fresh;
+    uint16_t plain_age;
 } input_t;
 
 typedef struct {
     uint8_t torque;
 } output_t;
 
-enum { SPEED_ID = 0x100, PLAIN_ID = 0x100, TORQUE_ID = 0x200, SPEED_MAX = 200, TIMEOUT_US = 5000 };
+enum { SPEED_ID = 0x100, PLAIN_ID = 0x100, TORQUE_ID = 0x200, SPEED_MAX = 200, TIMEOUT_US = 5000, DEADLINE_US = 10000 };
 
 static input_t input;
 static output_t output;
 static canopy_rx_state_t rx_states[2];
-static uint8_t tx_counters[2];
 static canopy_bus_state_t bus;
+static canopy_tx_slot_t slots[2];
+static canopy_tx_trace_t trace[1];
+static uint8_t tx_data[12];
+static canopy_tx_t transmit;
 
 static bool decode_speed(void *image, const uint8_t *data)
 {
@@ -37,9 +42,10 @@ static bool decode_speed(void *image, const uint8_t *data)
     return true;
 }
 
-static void speed_fresh(void *image, bool fresh)
+static void speed_age(void *image, bool fresh, uint16_t age_ms)
 {
     ((input_t *)image)->speed_fresh = fresh;
+    ((input_t *)image)->speed_age = age_ms;
 }
 
 static bool decode_plain(void *image, const uint8_t *data)
@@ -48,9 +54,10 @@ static bool decode_plain(void *image, const uint8_t *data)
     return true;
 }
 
-static void plain_fresh(void *image, bool fresh)
+static void plain_age(void *image, bool fresh, uint16_t age_ms)
 {
     ((input_t *)image)->plain_fresh = fresh;
+    ((input_t *)image)->plain_age = age_ms;
 }
 
 static void encode_torque(const void *image, uint8_t *data)
@@ -65,32 +72,35 @@ static void reset_output(void *image)
     ((output_t *)image)->torque = 7;
 }
 
-static void set_now(void *image, canopy_time_t now)
+static void set_cycle(void *image, const canopy_cycle_t *cycle)
 {
-    ((input_t *)image)->now = now;
+    ((input_t *)image)->now = cycle->now;
+    ((input_t *)image)->can_state = cycle->can_state;
+    ((input_t *)image)->overload = cycle->overload;
 }
 
 /* The second message has the same number as the first, as an extended id. */
 static const canopy_rx_message_t rx[] = {
-    {.id = SPEED_ID,
-     .length = 3,
-     .data_id = 1,
-     .timeout = TIMEOUT_US,
-     .decode = decode_speed,
-     .set_fresh = speed_fresh},
+    {.id = SPEED_ID, .length = 3, .data_id = 1, .timeout = TIMEOUT_US, .decode = decode_speed, .set_age = speed_age},
     {.id = PLAIN_ID,
      .flags = CANOPY_CAN_EXTENDED,
      .length = 1,
      .data_id = CANOPY_E2E_NONE,
      .decode = decode_plain,
-     .set_fresh = plain_fresh},
+     .set_age = plain_age},
 };
 static const canopy_tx_message_t tx[] = {
-    {.id = TORQUE_ID, .length = 3, .data_id = 2, .every = 1, .encode = encode_torque},
-    {.id = TORQUE_ID + 1, .length = 3, .data_id = CANOPY_E2E_NONE, .every = 3, .encode = encode_torque},
+    {.id = TORQUE_ID, .length = 3, .data_id = 2, .every = 1, .deadline = DEADLINE_US, .encode = encode_torque},
+    {.id = TORQUE_ID + 1,
+     .length = 3,
+     .data_id = CANOPY_E2E_NONE,
+     .every = 3,
+     .place = 6,
+     .deadline = 3u * (canopy_time_t)DEADLINE_US,
+     .encode = encode_torque},
 };
 static const canopy_bus_t tables = {
-    .rx = rx, .tx = tx, .rx_count = 2, .tx_count = 2, .reset_output = reset_output, .set_now = set_now};
+    .rx = rx, .tx = tx, .rx_count = 2, .tx_count = 2, .reset_output = reset_output, .set_cycle = set_cycle};
 
 void setUp(void)
 {
@@ -98,9 +108,12 @@ void setUp(void)
     memset(&input, 0, sizeof input);
     output = (output_t){0};
     memset(rx_states, 0, sizeof rx_states);
-    memset(tx_counters, 0, sizeof tx_counters);
-    bus = (canopy_bus_state_t){
-        .bus = &tables, .input = &input, .output = &output, .rx = rx_states, .tx_counters = tx_counters};
+    bus = (canopy_bus_state_t){.bus = &tables, .input = &input, .output = &output, .rx = rx_states};
+    TEST_ASSERT_EQUAL(
+        CANOPY_OK,
+        canopy_tx_init(&transmit, tx, 2,
+                       &(canopy_tx_memory_t){.slots = slots, .data = tx_data, .trace = trace, .trace_capacity = 1},
+                       &fake_can));
 }
 
 void tearDown(void)
@@ -115,33 +128,46 @@ static canopy_can_frame_t speed_frame(uint8_t counter, uint8_t speed)
     return frame;
 }
 
+/** Taken as soon as it has arrived. */
 static void receive(canopy_can_frame_t frame, canopy_time_t now)
 {
+    frame.time = now;
     canopy_bus_receive(&bus, &frame, now);
+}
+
+static void receive_late(canopy_can_frame_t frame, canopy_time_t arrived, canopy_time_t now)
+{
+    frame.time = arrived;
+    canopy_bus_receive(&bus, &frame, now);
+}
+
+static void begin_tick(canopy_time_t now)
+{
+    canopy_bus_begin_tick(&bus, &(canopy_cycle_t){.now = now});
 }
 
 static void a_good_frame_is_taken_and_becomes_stale(void)
 {
     receive(speed_frame(0, 42), 1000);
-    canopy_bus_begin_tick(&bus, 1000);
+    begin_tick(1000);
     TEST_ASSERT_EQUAL_UINT8(42, input.speed);
     TEST_ASSERT_TRUE(input.speed_fresh);
     TEST_ASSERT_EQUAL_UINT64(1000, input.now);
-    canopy_bus_begin_tick(&bus, 1000 + TIMEOUT_US - 1);
+    begin_tick(1000 + TIMEOUT_US - 1);
     TEST_ASSERT_TRUE(input.speed_fresh);
-    canopy_bus_begin_tick(&bus, 1000 + TIMEOUT_US);
+    begin_tick(1000 + TIMEOUT_US);
     TEST_ASSERT_FALSE(input.speed_fresh);
     TEST_ASSERT_EQUAL_UINT32(1, bus.counters.timeouts);
-    canopy_bus_begin_tick(&bus, 2000 + TIMEOUT_US);
+    begin_tick(2000 + TIMEOUT_US);
     TEST_ASSERT_EQUAL_UINT32(1, bus.counters.timeouts);
     receive(speed_frame(1, 43), 3000 + TIMEOUT_US);
-    canopy_bus_begin_tick(&bus, 3000 + TIMEOUT_US);
+    begin_tick(3000 + TIMEOUT_US);
     TEST_ASSERT_TRUE(input.speed_fresh);
 }
 
 static void nothing_is_fresh_before_the_first_frame(void)
 {
-    canopy_bus_begin_tick(&bus, 0);
+    begin_tick(0);
     TEST_ASSERT_FALSE(input.speed_fresh);
     TEST_ASSERT_FALSE(input.plain_fresh);
     TEST_ASSERT_EQUAL_UINT32(0, bus.counters.timeouts);
@@ -152,7 +178,7 @@ static void without_a_timeout_a_message_stays_fresh(void)
     canopy_can_frame_t frame = {.id = PLAIN_ID, .flags = CANOPY_CAN_EXTENDED, .length = 1, .data = {9}};
 
     receive(frame, 0);
-    canopy_bus_begin_tick(&bus, UINT64_MAX / 4u);
+    begin_tick(UINT64_MAX / 4u);
     TEST_ASSERT_TRUE(input.plain_fresh);
     TEST_ASSERT_EQUAL_UINT8(9, input.plain);
     TEST_ASSERT_EQUAL_UINT8(0, input.speed);
@@ -256,18 +282,20 @@ static void the_check_tells_frames_and_their_order_apart(void)
 static void outputs_take_their_safe_values_before_each_tick(void)
 {
     output.torque = 99;
-    canopy_bus_begin_tick(&bus, 0);
+    begin_tick(0);
     TEST_ASSERT_EQUAL_UINT8(7, output.torque);
 }
 
 static void messages_go_out_at_their_rate_with_counter_and_crc(void)
 {
     canopy_e2e_receiver_t receiver = {0};
+    canopy_tx_counters_t counters;
     unsigned slow = 0;
 
     output.torque = 5;
     for (uint32_t tick = 0; tick < 30u; tick++) {
-        canopy_bus_commit(&bus, &fake_can, tick);
+        canopy_bus_commit(&bus, &transmit, tick, tick);
+        canopy_tx_kick(&transmit, tick);
     }
     for (unsigned frame = 0; frame < fake.tx_count; frame++) {
         if (fake.tx[frame].id == TORQUE_ID) {
@@ -278,146 +306,185 @@ static void messages_go_out_at_their_rate_with_counter_and_crc(void)
         TEST_ASSERT_EQUAL_UINT8(5, fake.tx[frame].data[2]);
     }
     TEST_ASSERT_EQUAL_UINT(10, slow);
-    TEST_ASSERT_EQUAL_UINT32(40, bus.counters.sent);
+    canopy_tx_count(&transmit, &counters);
+    TEST_ASSERT_EQUAL_UINT32(40, counters.sent);
 }
 
-static void a_frame_that_the_driver_does_not_take_is_dropped_and_counted(void)
+static void each_message_has_its_own_deadline_after_the_tick(void)
 {
-    fake.tx_result = 0;
-    canopy_bus_commit(&bus, &fake_can, 1);
-    fake.tx_result = CANOPY_ERROR_BUS_DOWN;
-    canopy_bus_commit(&bus, &fake_can, 2);
-    TEST_ASSERT_EQUAL_UINT32(2, bus.counters.tx_dropped);
-    TEST_ASSERT_EQUAL_UINT32(0, bus.counters.sent);
+    canopy_tx_counters_t counters;
+
+    canopy_bus_commit(&bus, &transmit, 0, 1000);
+    canopy_tx_kick(&transmit, 1000 + DEADLINE_US);
+    TEST_ASSERT_EQUAL_UINT(1, fake.tx_count);
+    TEST_ASSERT_EQUAL_HEX32(TORQUE_ID + 1, fake.tx[0].id);
+    canopy_tx_count(&transmit, &counters);
+    TEST_ASSERT_EQUAL_UINT32(1, counters.expired);
 }
 
-static void signed_values_are_extended(void)
+static void all_messages_can_be_posted_with_one_deadline(void)
 {
-    TEST_ASSERT_EQUAL_INT32(-1, canopy_sign_extend32(0xFFFFFFu, 24));
-    TEST_ASSERT_EQUAL_INT32(-8388608, canopy_sign_extend32(0x800000u, 24));
-    TEST_ASSERT_EQUAL_INT32(8388607, canopy_sign_extend32(0x7FFFFFu, 24));
-    TEST_ASSERT_EQUAL_INT32(-1, canopy_sign_extend32(1, 1));
-    TEST_ASSERT_TRUE(canopy_sign_extend64(UINT64_C(0x8000000000), 40) == -INT64_C(0x8000000000));
+    canopy_bus_commit_all(&bus, &transmit, 500);
+    canopy_tx_kick(&transmit, 499);
+    TEST_ASSERT_EQUAL_UINT(2, fake.tx_count);
+    canopy_bus_commit_all(&bus, &transmit, 500);
+    canopy_tx_kick(&transmit, 500);
+    TEST_ASSERT_EQUAL_UINT(2, fake.tx_count);
 }
 
-static void a_ticked_write_wins_over_a_halt_handlers_whichever_came_first(void)
-{
-    uint32_t written[2] = {0};
+/* --- ages ---------------------------------------------------------------------------------------------------------- */
 
-    TEST_ASSERT_TRUE(canopy_output_claim(written, 33, true));
-    TEST_ASSERT_TRUE(canopy_output_claim(written, 33, false));
-    TEST_ASSERT_FALSE(canopy_output_claim(written, 33, true));
-    TEST_ASSERT_TRUE(canopy_output_claim(written, 33, false));
-    TEST_ASSERT_TRUE(canopy_output_claim(written, 1, true));
+static uint16_t speed_age_of(canopy_time_t age)
+{
+    const canopy_time_t now = UINT64_C(1) << 40;
+
+    memset(rx_states, 0, sizeof rx_states);
+    receive_late(speed_frame(0, 42), now - age, now);
+    return rx_states[0].age_ms;
 }
 
-/* One output and its setter, as the compiler makes them: 100 while driving, 5 by the halt handler, 0 is safe. */
-static struct {
-    uint32_t written[1];
-    bool halting;
-    int speed;
-} motor;
-
-static canopy_status_t arrived_says;
-
-static void set_speed(int speed)
+static void ages_are_whole_milliseconds_rounded_up(void)
 {
-    if (canopy_output_claim(motor.written, 0, motor.halting)) {
-        motor.speed = speed;
-    }
+    TEST_ASSERT_EQUAL_UINT16(0, speed_age_of(0));
+    TEST_ASSERT_EQUAL_UINT16(1, speed_age_of(1));
+    TEST_ASSERT_EQUAL_UINT16(1, speed_age_of(1000));
+    TEST_ASSERT_EQUAL_UINT16(2, speed_age_of(1001));
+    TEST_ASSERT_EQUAL_UINT16(65533, speed_age_of(65533000));
+    TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65533001));
+    TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65534000));
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65534001));
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(UINT64_C(1) << 32)); /* 0 in 32 bits */
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of((UINT64_C(1) << 32) + 1000u));
 }
 
-static canopy_status_t drive(void *application, uint16_t parameter)
+static void a_frame_that_came_after_the_cycle_began_has_the_age_0(void)
 {
-    (void)application;
-    (void)parameter;
-    set_speed(100);
-    return CANOPY_RUNNING;
+    receive_late(speed_frame(0, 42), 1500, 1000);
+    begin_tick(1000);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT16(0, input.speed_age);
+    begin_tick(1000 + TIMEOUT_US - 1); /* and counts from the cycle on: what was told is what counts */
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    begin_tick(1000 + TIMEOUT_US);
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
-static void drive_halted(void *application, uint16_t parameter)
+static void timeouts_count_from_the_wire_not_from_the_drain(void)
 {
-    (void)application;
-    (void)parameter;
-    motor.halting = true;
-    set_speed(5);
-    motor.halting = false;
+    receive_late(speed_frame(0, 42), 1000, 4000); /* 3 ms in a queue */
+    begin_tick(4000);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT16(3, input.speed_age);
+    begin_tick(1000 + TIMEOUT_US - 1);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT16(5, input.speed_age);
+    begin_tick(1000 + TIMEOUT_US);
+    TEST_ASSERT_FALSE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, input.speed_age);
+    TEST_ASSERT_EQUAL_UINT32(1, bus.counters.timeouts);
 }
 
-static canopy_status_t arrived(void *application, uint16_t parameter)
+static void what_is_rounded_up_is_never_called_fresher_than_it_is(void)
 {
-    (void)application;
-    (void)parameter;
-    return arrived_says;
+    receive_late(speed_frame(0, 42), 1001, 4000); /* 2.999 ms: told, and counted, as 3 */
+    begin_tick(1000 + TIMEOUT_US);
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
-static canopy_tree_instance_t driving;
-
-/** RunOnce, and below it a parallel node of two children, so that it runs to its end and is not started again. */
-static void start_driving(canopy_node_type_t parallel, canopy_node_type_t first, canopy_node_type_t second)
+static void a_frame_that_is_stale_when_it_is_taken_is_never_fresh(void)
 {
-    static const int32_t parameters[] = {1, 1};
-    static const canopy_leaf_t leaves[] = {{.tick = arrived},
-                                           {.tick = drive, .running = drive, .halted = drive_halted}};
-    static canopy_node_t nodes[4];
-    static canopy_tree_t tree = {.nodes = nodes,
-                                 .leaves = leaves,
-                                 .parameters = parameters,
-                                 .node_count = 4,
-                                 .leaf_count = 2,
-                                 .parameter_count = 2,
-                                 .word_count = 5};
-    static uint8_t status[4];
-    static uint16_t words[5];
-
-    nodes[0] = (canopy_node_t){.type = CANOPY_NODE_RUN_ONCE, .end = 4};
-    nodes[1] = (canopy_node_t){.type = (uint8_t)parallel, .end = 4, .state = 1};
-    nodes[2] =
-        (canopy_node_t){.type = (uint8_t)first, .parent = 1, .end = 3, .leaf = first == CANOPY_NODE_STATEFUL_ACTION};
-    nodes[3] =
-        (canopy_node_t){.type = (uint8_t)second, .parent = 1, .end = 4, .leaf = second == CANOPY_NODE_STATEFUL_ACTION};
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&tree, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&driving, &tree, status, words, NULL));
+    receive_late(speed_frame(0, 42), 0, TIMEOUT_US);
+    begin_tick(TIMEOUT_US);
+    TEST_ASSERT_FALSE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT32(1, bus.counters.accepted);
+    receive_late(speed_frame(1, 43), TIMEOUT_US, TIMEOUT_US + UINT64_C(70000000)); /* too old for a number */
+    begin_tick(TIMEOUT_US + UINT64_C(70000000));
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
-static int speed_after_tick(canopy_status_t arrived_status)
+static void without_a_timeout_even_the_oldest_frame_is_fresh(void)
 {
-    motor.written[0] = 0;
-    motor.speed = 0;
-    arrived_says = arrived_status;
-    (void)canopy_tree_tick(&driving, 0);
-    return motor.speed;
+    canopy_can_frame_t frame = {.id = PLAIN_ID, .flags = CANOPY_CAN_EXTENDED, .length = 1, .data = {9}};
+
+    receive_late(frame, 0, UINT64_C(70000000));
+    begin_tick(UINT64_C(70000000));
+    TEST_ASSERT_TRUE(input.plain_fresh);
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, input.plain_age);
+    receive_late(frame, UINT64_C(70000000), UINT64_C(70000000));
+    begin_tick(UINT64_C(70000000) + 65534000u);
+    TEST_ASSERT_EQUAL_UINT16(65534, input.plain_age);
+    begin_tick(UINT64_C(70000000) + 65534001u);
+    TEST_ASSERT_TRUE(input.plain_fresh);
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, input.plain_age);
 }
 
-/* Rule 5: ticked and halted in one tick, the child keeps what it wrote; in the next tick it is safe. */
-static void a_child_of_a_parallel_ticked_and_halted_in_one_tick_keeps_what_it_wrote(void)
+static void ages_are_right_across_the_wrap_of_time(void)
 {
-    start_driving(CANOPY_NODE_REACTIVE_PARALLEL, CANOPY_NODE_STATEFUL_ACTION, CANOPY_NODE_CONDITION);
-    TEST_ASSERT_EQUAL_INT(100, speed_after_tick(CANOPY_FAILURE));
-    TEST_ASSERT_EQUAL_INT(100, speed_after_tick(CANOPY_SUCCESS));
-    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&driving, 2));
-    TEST_ASSERT_EQUAL_INT(0, speed_after_tick(CANOPY_SUCCESS));
+    receive_late(speed_frame(0, 42), UINT64_MAX - 999u, 1000); /* 2 ms ago */
+    begin_tick(1000);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    TEST_ASSERT_EQUAL_UINT16(2, input.speed_age);
+    begin_tick(TIMEOUT_US - 1000 - 1);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    begin_tick(TIMEOUT_US - 1000);
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
-/* A Parallel asks its thresholds after each child: one that comes before the action ends it before it is ticked. */
-static void a_child_that_is_halted_and_not_ticked_leaves_what_its_handler_wrote(void)
+static void what_is_stale_stays_so_when_time_has_gone_half_round(void)
 {
-    start_driving(CANOPY_NODE_PARALLEL, CANOPY_NODE_CONDITION, CANOPY_NODE_STATEFUL_ACTION);
-    TEST_ASSERT_EQUAL_INT(100, speed_after_tick(CANOPY_SKIPPED));
-    TEST_ASSERT_EQUAL_INT(5, speed_after_tick(CANOPY_SUCCESS));
-    TEST_ASSERT_EQUAL_INT(0, speed_after_tick(CANOPY_SUCCESS));
+    receive(speed_frame(0, 42), 0);
+    begin_tick(TIMEOUT_US);
+    TEST_ASSERT_FALSE(input.speed_fresh);
+    begin_tick((UINT64_C(1) << 63) + TIMEOUT_US + 1u); /* before the deadline, seen across the wrap */
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
-static void constants_round_to_the_nearest_raw_value(void)
+static void a_refused_frame_does_not_make_what_is_there_younger(void)
 {
-    const volatile double not_folded = -0.48; /* the same at run time */
-    const int32_t raw = CANOPY_RAW(int32_t, not_folded, 0.001, 0.0);
+    canopy_can_frame_t damaged = speed_frame(1, 50);
 
-    TEST_ASSERT_EQUAL_INT32(-480, raw);
-    TEST_ASSERT_EQUAL_INT32(480, CANOPY_RAW(int32_t, 0.48, 0.001, 0.0));
-    TEST_ASSERT_EQUAL_INT32(-480, CANOPY_RAW(int32_t, -0.48, 0.001, 0.0));
-    TEST_ASSERT_EQUAL_INT32(29, CANOPY_RAW(int32_t, 0.29, 0.01, 0.0));
-    TEST_ASSERT_EQUAL_INT32(140, CANOPY_RAW(int32_t, 100, 1.0, -40.0));
+    damaged.data[2] ^= 1u;
+    receive(speed_frame(0, 42), 1000);
+    begin_tick(1000);
+    receive(damaged, 4000);
+    begin_tick(4000);
+    TEST_ASSERT_EQUAL_UINT16(3, input.speed_age);
+    TEST_ASSERT_TRUE(rx_states[0].taken_then); /* and it is told that one came */
+    TEST_ASSERT_EQUAL_UINT16(0, rx_states[0].age_ms);
+}
+
+static void leaves_see_the_state_of_the_bus(void)
+{
+    canopy_bus_begin_tick(&bus, &(canopy_cycle_t){.now = 5, .can_state = CANOPY_CAN_BLOCKED, .overload = true});
+    TEST_ASSERT_EQUAL_UINT64(5, input.now);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_BLOCKED, input.can_state);
+    TEST_ASSERT_TRUE(input.overload);
+    begin_tick(6);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, input.can_state);
+    TEST_ASSERT_FALSE(input.overload);
+}
+
+/* --- the check ----------------------------------------------------------------------------------------------------- */
+
+/** By its definition in docs/trace.md. */
+static uint8_t rotated(uint8_t check)
+{
+    return (uint8_t)((unsigned)check << 3 | (unsigned)check >> 5);
+}
+
+static void the_check_folds_in_ages_and_the_state_of_the_bus(void)
+{
+    uint8_t check;
+
+    receive_late(speed_frame(0, 42), 0, UINT64_C(259000)); /* 259 = 0x103 ms */
+    check = bus.check;
+    canopy_bus_begin_tick(&bus, &(canopy_cycle_t){.now = 259000, .can_state = CANOPY_CAN_BUS_OFF, .overload = true});
+    check = rotated(check) ^ 0x01u ^ 0x03u;
+    check = rotated(check) ^ 4u ^ 8u;
+    TEST_ASSERT_EQUAL_HEX8(check, bus.check);
+    begin_tick(260000); /* no frame was taken: only the state */
+    TEST_ASSERT_EQUAL_HEX8(rotated(check), bus.check);
+    TEST_ASSERT_FALSE(rx_states[0].taken_then);
 }
 
 int main(void)
@@ -432,11 +499,18 @@ int main(void)
     RUN_TEST(the_check_tells_frames_and_their_order_apart);
     RUN_TEST(outputs_take_their_safe_values_before_each_tick);
     RUN_TEST(messages_go_out_at_their_rate_with_counter_and_crc);
-    RUN_TEST(a_frame_that_the_driver_does_not_take_is_dropped_and_counted);
-    RUN_TEST(signed_values_are_extended);
-    RUN_TEST(a_ticked_write_wins_over_a_halt_handlers_whichever_came_first);
-    RUN_TEST(a_child_of_a_parallel_ticked_and_halted_in_one_tick_keeps_what_it_wrote);
-    RUN_TEST(a_child_that_is_halted_and_not_ticked_leaves_what_its_handler_wrote);
-    RUN_TEST(constants_round_to_the_nearest_raw_value);
+    RUN_TEST(each_message_has_its_own_deadline_after_the_tick);
+    RUN_TEST(all_messages_can_be_posted_with_one_deadline);
+    RUN_TEST(ages_are_whole_milliseconds_rounded_up);
+    RUN_TEST(a_frame_that_came_after_the_cycle_began_has_the_age_0);
+    RUN_TEST(timeouts_count_from_the_wire_not_from_the_drain);
+    RUN_TEST(what_is_rounded_up_is_never_called_fresher_than_it_is);
+    RUN_TEST(a_frame_that_is_stale_when_it_is_taken_is_never_fresh);
+    RUN_TEST(without_a_timeout_even_the_oldest_frame_is_fresh);
+    RUN_TEST(ages_are_right_across_the_wrap_of_time);
+    RUN_TEST(what_is_stale_stays_so_when_time_has_gone_half_round);
+    RUN_TEST(a_refused_frame_does_not_make_what_is_there_younger);
+    RUN_TEST(leaves_see_the_state_of_the_bus);
+    RUN_TEST(the_check_folds_in_ages_and_the_state_of_the_bus);
     return UNITY_END();
 }

@@ -3,7 +3,7 @@
  * @file
  * The drivers' common filter, and which frames can exist on a CAN bus.
  */
-#include "canopy/can/acceptance.h"
+#include "canopy/acceptance.h"
 
 #include "unity.h"
 
@@ -32,15 +32,40 @@ static bool accepts(const canopy_can_acceptance_t *acceptance, uint32_t id, int 
     return canopy_can_accepts(acceptance, &made);
 }
 
-static void test_without_a_filter_all_but_error_frames_are_accepted(void)
+static void test_everything_is_all_but_error_frames(void)
+{
+    TEST_ASSERT_TRUE(accepts(CANOPY_CAN_ACCEPT_EVERYTHING, 0x123, 0));
+    TEST_ASSERT_TRUE(accepts(CANOPY_CAN_ACCEPT_EVERYTHING, 0x1ABCDEF0, CANOPY_CAN_EXTENDED));
+    TEST_ASSERT_TRUE(accepts(CANOPY_CAN_ACCEPT_EVERYTHING, 0x123, CANOPY_CAN_REMOTE));
+    TEST_ASSERT_FALSE(accepts(CANOPY_CAN_ACCEPT_EVERYTHING, 0x40, CANOPY_CAN_ERROR));
+    TEST_ASSERT_TRUE(canopy_can_accepts_everything(CANOPY_CAN_ACCEPT_EVERYTHING));
+}
+
+static void test_an_empty_list_accepts_nothing(void)
 {
     const canopy_can_acceptance_t empty = {0};
 
-    TEST_ASSERT_TRUE(accepts(NULL, 0x123, 0));
-    TEST_ASSERT_TRUE(accepts(NULL, 0x1ABCDEF0, CANOPY_CAN_EXTENDED));
-    TEST_ASSERT_TRUE(accepts(&empty, 0x123, CANOPY_CAN_REMOTE));
-    TEST_ASSERT_FALSE(accepts(NULL, 0x40, CANOPY_CAN_ERROR));
+    TEST_ASSERT_FALSE(accepts(&empty, 0x123, 0));
     TEST_ASSERT_FALSE(accepts(&empty, 0x40, CANOPY_CAN_ERROR));
+    TEST_ASSERT_FALSE(canopy_can_accepts_everything(&empty));
+}
+
+static void test_a_list_goes_on_in_the_next(void)
+{
+    static const uint32_t own[] = {0x700};
+    static const uint32_t ids[] = {0x100};
+    const canopy_can_acceptance_t second = {.ids = ids, .count = 1};
+    const canopy_can_acceptance_t curious = {.error_frames = true, .next = &second};
+    const canopy_can_acceptance_t first = {.ids = own, .count = 1, .next = &curious};
+    const canopy_can_acceptance_t all = {.ids = own, .count = 1, .next = CANOPY_CAN_ACCEPT_EVERYTHING};
+
+    TEST_ASSERT_TRUE(accepts(&first, 0x700, 0));
+    TEST_ASSERT_TRUE(accepts(&first, 0x100, 0));
+    TEST_ASSERT_FALSE(accepts(&first, 0x101, 0));
+    TEST_ASSERT_TRUE(accepts(&first, 0x40, CANOPY_CAN_ERROR));
+    TEST_ASSERT_FALSE(canopy_can_accepts_everything(&first));
+    TEST_ASSERT_TRUE(canopy_can_accepts_everything(&all));
+    TEST_ASSERT_TRUE(accepts(&all, 0x101, 0));
 }
 
 static void test_listed_ids_are_accepted_and_the_formats_are_told_apart(void)
@@ -70,7 +95,19 @@ static void test_filter_is_checked(void)
 {
     static const uint32_t ids[] = {1};
 
-    TEST_ASSERT_TRUE(canopy_can_acceptance_is_valid(NULL));
+    static const uint32_t many[CANOPY_CAN_ACCEPT_MAX] = {0};
+    const canopy_can_acceptance_t full = {.ids = many, .count = CANOPY_CAN_ACCEPT_MAX};
+    canopy_can_acceptance_t circle = {.ids = ids, .count = 1};
+
+    circle.next = &circle;
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(NULL));
+    TEST_ASSERT_TRUE(canopy_can_acceptance_is_valid(&full));
+    TEST_ASSERT_FALSE(
+        canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.ids = ids, .count = 1, .next = &full}));
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&circle));
+    circle.ids = NULL;
+    circle.count = 0;
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&circle));
     TEST_ASSERT_TRUE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){0}));
     TEST_ASSERT_TRUE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.ids = ids, .count = 1}));
     TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.ids = ids, .count = 0}));
@@ -126,7 +163,9 @@ static void test_error_frames_are_not_for_the_loop_to_send(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_without_a_filter_all_but_error_frames_are_accepted);
+    RUN_TEST(test_everything_is_all_but_error_frames);
+    RUN_TEST(test_an_empty_list_accepts_nothing);
+    RUN_TEST(test_a_list_goes_on_in_the_next);
     RUN_TEST(test_listed_ids_are_accepted_and_the_formats_are_told_apart);
     RUN_TEST(test_error_frames_are_accepted_on_request_whatever_their_id);
     RUN_TEST(test_filter_is_checked);

@@ -34,7 +34,7 @@ void tearDown(void)
 
 static void expect_refused(canopy_error_t error, const char *spec, const char *way_out)
 {
-    TEST_ASSERT_EQUAL(error, canopy_can_open(&port, spec, NULL, message, sizeof message));
+    TEST_ASSERT_EQUAL(error, canopy_can_open(&port, spec, CANOPY_CAN_ACCEPT_EVERYTHING, message, sizeof message));
     TEST_ASSERT_NULL(port.can);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, spec), message);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, way_out), message);
@@ -45,13 +45,22 @@ static void test_unixbus_is_opened_and_closed(void)
 {
     const canopy_can_frame_t frame = {.id = 1};
 
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_can_open(&port, "unixbus:bus0", NULL, message, sizeof message));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_can_open(&port, "unixbus:bus0", CANOPY_CAN_ACCEPT_EVERYTHING, message, sizeof message));
     TEST_ASSERT_EQUAL_STRING("", message);
     TEST_ASSERT_EQUAL(CANOPY_CAN_OPEN_UNIXBUS, port.kind);
-    TEST_ASSERT_EQUAL(1, port.can->send(port.can->context, &frame));
+    TEST_ASSERT_NULL(canopy_can_advice(&port, 0)); /* it keeps all promises */
+    TEST_ASSERT_EQUAL(1, port.can->send(port.can->context, 0, &frame));
     canopy_can_close(&port);
     TEST_ASSERT_NULL(port.can);
     canopy_can_close(&port);
+    TEST_ASSERT_NULL(canopy_can_advice(&port, 0));
+}
+
+static void test_a_filter_must_be_given(void)
+{
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_can_open(&port, "unixbus:bus0", NULL, message, sizeof message));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_can_open(&port, "socketcan:can0", NULL, message, sizeof message));
 }
 
 static void test_spec_of_no_known_form(void)
@@ -74,7 +83,8 @@ static void test_unixbus_that_cannot_be(void)
 /* What the kernel says depends on whether it has CAN; where it has, tests/integration/rig/test_socketcan.py goes on. */
 static void test_socketcan_interface_that_is_not_there(void)
 {
-    const canopy_error_t error = canopy_can_open(&port, "socketcan:nocan9", NULL, message, sizeof message);
+    const canopy_error_t error =
+        canopy_can_open(&port, "socketcan:nocan9", CANOPY_CAN_ACCEPT_EVERYTHING, message, sizeof message);
 
     TEST_ASSERT_TRUE(error == CANOPY_ERROR_NOT_FOUND || error == CANOPY_ERROR_UNSUPPORTED);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, error == CANOPY_ERROR_NOT_FOUND ? "ip link add" : "with-vcan"),
@@ -88,7 +98,8 @@ static void test_long_message_is_shortened(void)
     char small[20];
     memset(small, 'x', sizeof small);
 
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_can_open(&port, "?", NULL, small, sizeof small - 1u));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_can_open(&port, "?", CANOPY_CAN_ACCEPT_EVERYTHING, small, sizeof small - 1u));
     TEST_ASSERT_EQUAL_UINT(sizeof small - 2u, strlen(small));
     TEST_ASSERT_EQUAL_CHAR('x', small[sizeof small - 1u]);
 }
@@ -97,6 +108,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_unixbus_is_opened_and_closed);
+    RUN_TEST(test_a_filter_must_be_given);
     RUN_TEST(test_spec_of_no_known_form);
     RUN_TEST(test_unixbus_that_cannot_be);
     RUN_TEST(test_socketcan_interface_that_is_not_there);

@@ -358,6 +358,19 @@ static void an_image_is_not_run_in_the_loop_of_another_application(void)
     TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&exchange_image, &loop, time)); /* it is still loaded */
 }
 
+static void an_exchange_on_a_bus_that_lets_nothing_out_says_so_and_is_done(void)
+{
+    cycle();
+    TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK,
+                          canopy_image_load(&exchange_image, exchange_other_bytes, sizeof exchange_other_bytes, NULL));
+    fake.tx_result = 0;
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_BUS_DOWN, canopy_image_run(&exchange_image, &loop, time));
+    TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) != 0u);
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_NOT_FOUND, canopy_image_run(&exchange_image, &loop, time)); /* not once more */
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_BUS_DOWN, canopy_image_run_own(&exchange_image, &loop, time));
+    TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == 0u);
+}
+
 static void an_image_may_lie_at_any_address(void)
 {
     for (unsigned offset = 0; offset < 8u; offset++) {
@@ -685,6 +698,7 @@ int main(void)
     RUN_TEST(the_tree_that_ran_is_halted_and_all_begins_again);
     RUN_TEST(what_runs_goes_on_while_another_is_refused_or_loaded);
     RUN_TEST(an_image_is_not_run_in_the_loop_of_another_application);
+    RUN_TEST(an_exchange_on_a_bus_that_lets_nothing_out_says_so_and_is_done);
     RUN_TEST(an_image_may_lie_at_any_address);
     RUN_TEST(null_pointers_are_refused);
     RUN_TEST(every_other_length_is_refused);

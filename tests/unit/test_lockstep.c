@@ -22,6 +22,13 @@ static struct {
     int stop_at_wait; /* sets the stop flag at this wait */
     int wait_result;  /* of a wait without frames */
     canopy_can_frame_t sent;
+    unsigned sends;
+    int busy_sends;           /* so many more find no room */
+    int pending;              /* so often more a frame is not out yet; -1: it never will be */
+    canopy_can_outcome_t end; /* what becomes of it */
+    unsigned aborts;
+    unsigned restarts;
+    int short_waits;
 } inner;
 
 static atomic_bool stop;
@@ -39,16 +46,59 @@ static int inner_receive(void *context, canopy_can_frame_t *frame)
     return 1;
 }
 
-static int inner_send(void *context, const canopy_can_frame_t *frame)
+static int inner_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    TEST_ASSERT_EQUAL_UINT8(0, mailbox);
+    inner.sends++;
+    if (inner.busy_sends > 0) {
+        inner.busy_sends--;
+        return 0;
+    }
+    if (frame->id > 0x7FFu) {
+        return CANOPY_ERROR_ARGUMENT;
+    }
     inner.sent = *frame;
     return 1;
+}
+
+static canopy_can_outcome_t inner_outcome(void *context, uint8_t mailbox)
+{
+    (void)context;
+    TEST_ASSERT_EQUAL_UINT8(0, mailbox);
+    if (inner.pending != 0) {
+        inner.pending -= inner.pending > 0 ? 1 : 0;
+        return CANOPY_CAN_PENDING;
+    }
+    return inner.end;
+}
+
+static void inner_abort(void *context, uint8_t mailbox)
+{
+    (void)context;
+    (void)mailbox;
+    inner.aborts++;
+}
+
+static canopy_can_controller_t inner_state(void *context)
+{
+    (void)context;
+    return CANOPY_CAN_CONTROLLER_PASSIVE;
+}
+
+static void inner_restart(void *context)
+{
+    (void)context;
+    inner.restarts++;
 }
 
 static int inner_wait(void *context, uint32_t timeout_us)
 {
     (void)context;
+    if (timeout_us == CANOPY_LOCKSTEP_POLL_US) { /* while it sends */
+        inner.short_waits++;
+        return inner.waiting > 0 ? 1 : 0;
+    }
     TEST_ASSERT_EQUAL_UINT32(CANOPY_LOCKSTEP_SLICE_US, timeout_us);
     inner.waits++;
     if (inner.waits == inner.stop_at_wait) {
@@ -75,8 +125,15 @@ void setUp(void)
     inner.waits = 0;
     inner.stop_at_wait = 0;
     inner.wait_result = 0;
+    inner.sends = 0;
+    inner.busy_sends = 0;
+    inner.pending = 0;
+    inner.end = CANOPY_CAN_SENT;
+    inner.aborts = 0;
+    inner.restarts = 0;
+    inner.short_waits = 0;
     atomic_store(&stop, false);
-    inner_can = (canopy_can_t){NULL, inner_receive, inner_send, inner_wait, inner_stats};
+    inner_can = (canopy_can_t){.receive = inner_receive, .send = inner_send, .wait = inner_wait, .stats = inner_stats};
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_lockstep_init(&lockstep, &inner_can, STEP_ID, &stop));
 }
 
@@ -105,6 +162,7 @@ static void expect_frame(uint32_t id, uint8_t data)
     TEST_ASSERT_EQUAL(1, lockstep.can.receive(lockstep.can.context, &frame));
     TEST_ASSERT_EQUAL_HEX32(id, frame.id);
     TEST_ASSERT_EQUAL_HEX8(data, frame.data[0]);
+    TEST_ASSERT_TRUE(frame.time == lockstep.now); /* time stood still while it came */
 }
 
 static void expect_no_frame(void)
@@ -255,9 +313,81 @@ static void test_frames_are_sent_by_the_inner_driver(void)
 {
     const canopy_can_frame_t frame = {.id = 0x200, .length = 0};
 
-    TEST_ASSERT_EQUAL(1, lockstep.can.send(lockstep.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, lockstep.can.send(lockstep.can.context, 0, &frame));
     TEST_ASSERT_EQUAL_HEX32(0x200, inner.sent.id);
     TEST_ASSERT_NULL(lockstep.can.wait);
+}
+
+static int send(uint32_t id)
+{
+    const canopy_can_frame_t frame = {.id = id};
+    return lockstep.can.send(lockstep.can.context, 0, &frame);
+}
+
+static void test_a_send_waits_until_the_frame_is_out(void)
+{
+    inner_can.outcome = inner_outcome;
+    inner.busy_sends = 3;
+    inner.pending = 5;
+    TEST_ASSERT_EQUAL(1, send(0x200));
+    TEST_ASSERT_EQUAL_UINT(4, inner.sends);
+    TEST_ASSERT_EQUAL(0, inner.pending);
+    TEST_ASSERT_EQUAL(8, inner.short_waits);
+    TEST_ASSERT_NULL(lockstep.can.outcome); /* nothing is left to do between two ticks */
+    inner.end = CANOPY_CAN_ABORTED;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(0x201));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, send(0x800));
+}
+
+static void test_a_send_that_takes_too_long_is_an_error_and_not_tried_between_ticks(void)
+{
+    inner_can.outcome = inner_outcome;
+    inner_can.abort = inner_abort;
+    inner.pending = -1;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(0x200));
+    TEST_ASSERT_EQUAL(CANOPY_LOCKSTEP_SEND_WAITS, inner.short_waits);
+    TEST_ASSERT_EQUAL_UINT(1, inner.aborts);
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(0x201)); /* not handed over: the first one is still there */
+    TEST_ASSERT_EQUAL_UINT(1, inner.sends);
+    inner.pending = 2;
+    TEST_ASSERT_EQUAL(1, send(0x202));
+    TEST_ASSERT_EQUAL_HEX32(0x202, inner.sent.id);
+    TEST_ASSERT_EQUAL_UINT(2, inner.sends);
+    inner.busy_sends = 1000000;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(0x203));
+}
+
+static void test_frames_that_come_meanwhile_do_not_make_a_send_endless(void)
+{
+    inner_can.outcome = inner_outcome;
+    inner.pending = -1;
+    inner.waiting = 1; /* so each wait ends at once */
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send(0x200));
+    TEST_ASSERT_EQUAL(CANOPY_LOCKSTEP_SEND_POLLS, inner.short_waits);
+}
+
+static void test_state_and_restart_are_the_inner_drivers(void)
+{
+    TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_ACTIVE, lockstep.can.state(lockstep.can.context));
+    lockstep.can.restart(lockstep.can.context);
+    inner_can.state = inner_state;
+    inner_can.restart = inner_restart;
+    inner_can.is_filtered = true;
+    TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_PASSIVE, lockstep.can.state(lockstep.can.context));
+    lockstep.can.restart(lockstep.can.context);
+    TEST_ASSERT_EQUAL_UINT(1, inner.restarts);
+    TEST_ASSERT_FALSE(lockstep.can.is_filtered);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_lockstep_init(&lockstep, &inner_can, STEP_ID, &stop));
+    TEST_ASSERT_TRUE(lockstep.can.is_filtered);
+}
+
+static void test_an_inner_driver_need_not_count(void)
+{
+    canopy_can_stats_t stats;
+
+    inner_can.stats = NULL;
+    lockstep.can.stats(lockstep.can.context, &stats);
+    TEST_ASSERT_EQUAL_UINT32(0, stats.sent);
 }
 
 static void test_init_refuses_bad_arguments(void)
@@ -285,6 +415,11 @@ int main(void)
     RUN_TEST(test_inner_driver_that_keeps_failing_ends_the_wait);
     RUN_TEST(test_full_buffer_keeps_the_newest_and_counts_the_rest);
     RUN_TEST(test_frames_are_sent_by_the_inner_driver);
+    RUN_TEST(test_a_send_waits_until_the_frame_is_out);
+    RUN_TEST(test_a_send_that_takes_too_long_is_an_error_and_not_tried_between_ticks);
+    RUN_TEST(test_frames_that_come_meanwhile_do_not_make_a_send_endless);
+    RUN_TEST(test_state_and_restart_are_the_inner_drivers);
+    RUN_TEST(test_an_inner_driver_need_not_count);
     RUN_TEST(test_init_refuses_bad_arguments);
     return UNITY_END();
 }

@@ -39,17 +39,18 @@ static void reset_output(void *output)
 
 static canopy_time_t last_now;
 
-static void set_now(void *input, canopy_time_t now)
+static void set_cycle(void *input, const canopy_cycle_t *its)
 {
     (void)input;
-    last_now = now;
+    last_now = its->now;
 }
 
-static const canopy_bus_t bus = {.reset_output = reset_output, .set_now = set_now};
+static const canopy_bus_t bus = {.reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_trace_config_t trace = {.tick = {.id = TICK_ID},
                                             .change = {.id = CHANGE_ID},
                                             .snapshot = {.id = SNAPSHOT_ID},
                                             .inputs = {.id = CANOPY_TRACE_OFF},
+                                            .arrivals = {.id = CANOPY_TRACE_OFF},
                                             .health = {.id = HEALTH_ID},
                                             .model = {.id = CANOPY_TRACE_OFF},
                                             .health_every = 4,
@@ -61,8 +62,12 @@ static canopy_trace_state_t trace_state;
 static uint8_t status[NODES];
 static uint8_t sent[NODES];
 static int image;
+static canopy_tx_t tx;
+static canopy_tx_trace_t waiting[8];
 static const canopy_app_t app = {.name = "test",
                                  .period = PERIOD_US,
+                                 .rx_max = 4,
+                                 .frame_us = 220,
                                  .tree = &tree,
                                  .bus = &bus,
                                  .trace = &trace,
@@ -71,6 +76,8 @@ static const canopy_app_t app = {.name = "test",
                                  .bus_state = &bus_state,
                                  .input = &image,
                                  .output = &image,
+                                 .tx = &tx,
+                                 .tx_memory = {.trace = waiting, .trace_capacity = 8},
                                  .trace_state = &trace_state,
                                  .sent = sent};
 
@@ -116,7 +123,7 @@ static bool wait_until(void *context, canopy_time_t deadline)
 
 static const canopy_clock_t fake_clock = {.now = now, .wait_until = wait_until};
 static unsigned kicks;
-static unsigned faults[4];
+static unsigned faults[8];
 
 static void kick(void *context)
 {
@@ -132,7 +139,7 @@ static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
 }
 
 static const canopy_loop_config_t config = {
-    .app = &app, .can = &fake_can, .clock = &fake_clock, .rx_max = 4, .kick_watchdog = kick, .on_fault = on_fault};
+    .app = &app, .can = &fake_can, .clock = &fake_clock, .kick_watchdog = kick, .on_fault = on_fault};
 static canopy_loop_t loop;
 
 void setUp(void)
@@ -207,6 +214,17 @@ static void a_flooded_bus_cannot_hold_up_the_tick(void)
     TEST_ASSERT_EQUAL_UINT(10, fake.rx_taken);
     TEST_ASSERT_EQUAL_UINT32(2, loop.rx_backlogs);
     TEST_ASSERT_EQUAL_UINT32(10, bus_state.counters.unknown_id);
+}
+
+static void a_configuration_can_take_fewer_frames_than_the_bus_carries(void)
+{
+    canopy_loop_config_t fewer = config;
+
+    fewer.rx_max = 2;
+    fake.rx_count = 3;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &fewer));
+    (void)canopy_loop_cycle(&loop, 0);
+    TEST_ASSERT_EQUAL_UINT(2, fake.rx_taken);
 }
 
 static void faults_are_counted_and_reported(void)
@@ -290,13 +308,14 @@ static void inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is(voi
 {
     static const canopy_trace_config_t replayed = {.tick = {.id = TICK_ID},
                                                    .inputs = {.id = INPUTS_ID, .flags = CANOPY_CAN_EXTENDED},
+                                                   .arrivals = {.id = CANOPY_TRACE_OFF},
                                                    .change = {.id = CANOPY_TRACE_OFF},
                                                    .snapshot = {.id = CANOPY_TRACE_OFF},
                                                    .health = {.id = CANOPY_TRACE_OFF},
                                                    .model = {.id = MODEL_ID},
                                                    .health_every = 1,
                                                    .model_every = 3};
-    static const uint8_t inputs_0[] = {0xA6, 0xA5, 0xA4, 0xA3, 0xA2, 0xA1, 200, 0x5A};
+    static const uint8_t inputs_0[] = {0xA6, 0xA5, 0xA4, 0xA3, 0xA2, 0xA1, 200, 0xD2}; /* 0x5A, rotated */
     static const uint8_t model_0[] = {0x21, 0x72, 0xBD, 0x14, NODES, 0, 0, 0};
     canopy_app_t traced = app;
     canopy_loop_config_t traced_config = config;
@@ -329,10 +348,22 @@ static void inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is(voi
 
 static void lost_trace_frames_are_counted(void)
 {
+    canopy_tx_counters_t counters;
+
     fake.tx_result = 0;
+    (void)canopy_loop_cycle(&loop, 0); /* 5 frames, and then 4: one more than there is room for */
     (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT32(5, trace_state.tx_dropped);
-    TEST_ASSERT_EQUAL_UINT8(4, trace_state.sequence);
+    canopy_tx_count(&tx, &counters);
+    TEST_ASSERT_EQUAL_UINT32(1, counters.trace_dropped);
+    TEST_ASSERT_EQUAL_UINT8(8, trace_state.sequence);
+    (void)canopy_loop_cycle(&loop,
+                            (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US); /* the 8 are too late now; 4 more wait */
+    fake.tx_result = 1;
+    (void)canopy_loop_cycle(&loop, (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US);
+    canopy_tx_count(&tx, &counters);
+    TEST_ASSERT_EQUAL_UINT32(9, counters.trace_dropped);
+    TEST_ASSERT_EQUAL_UINT32(fake.tx_count, counters.trace_sent);
+    TEST_ASSERT_EQUAL_UINT8(8, fake.tx[0].data[0]); /* by the sequence numbers a monitor knows how many it has missed */
 }
 
 static void the_tick_number_wraps_and_messages_go_on(void)
@@ -377,6 +408,7 @@ int main(void)
     RUN_TEST(an_overrun_is_counted_and_the_phase_kept);
     RUN_TEST(a_cycle_that_ends_on_the_deadline_is_in_time);
     RUN_TEST(a_flooded_bus_cannot_hold_up_the_tick);
+    RUN_TEST(a_configuration_can_take_fewer_frames_than_the_bus_carries);
     RUN_TEST(faults_are_counted_and_reported);
     RUN_TEST(the_trace_tells_what_changed_and_sends_the_rest_later);
     RUN_TEST(a_single_change_names_no_second_node);

@@ -12,7 +12,10 @@ static canopy_tree_instance_t instance;
 static canopy_bus_state_t bus_state;
 static canopy_trace_state_t trace_state;
 static canopy_rx_state_t rx_state;
-static uint8_t tx_counter;
+static canopy_tx_t transmit;
+static canopy_tx_slot_t slot;
+static canopy_tx_trace_t waiting[1];
+static uint8_t tx_data[2];
 static uint8_t status;
 static uint8_t sent;
 static int image;
@@ -24,10 +27,11 @@ static bool decode(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_fresh(void *input, bool fresh)
+static void set_age(void *input, bool fresh, uint16_t age_ms)
 {
     (void)input;
     (void)fresh;
+    (void)age_ms;
 }
 
 static void encode(const void *output, uint8_t *data)
@@ -41,23 +45,25 @@ static void reset_output(void *output)
     (void)output;
 }
 
-static void set_now(void *input, canopy_time_t now)
+static void set_cycle(void *input, const canopy_cycle_t *cycle)
 {
     (void)input;
-    (void)now;
+    (void)cycle;
 }
 
 static const canopy_rx_message_t rx = {
-    .id = 1, .length = 1, .data_id = CANOPY_E2E_NONE, .decode = decode, .set_fresh = set_fresh};
-static const canopy_tx_message_t tx = {.id = 2, .length = 1, .data_id = CANOPY_E2E_NONE, .every = 1, .encode = encode};
+    .id = 1, .length = 1, .data_id = CANOPY_E2E_NONE, .decode = decode, .set_age = set_age};
+static const canopy_tx_message_t tx = {
+    .id = 2, .length = 1, .data_id = CANOPY_E2E_NONE, .every = 1, .deadline = PERIOD_US, .encode = encode};
 static const canopy_bus_t bus = {
-    .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_now = set_now};
-static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_now = set_now};
-static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_now = set_now};
+    .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
+static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
+static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_trace_config_t no_trace = {.tick = {.id = CANOPY_TRACE_OFF},
                                                .change = {.id = CANOPY_TRACE_OFF},
                                                .snapshot = {.id = CANOPY_TRACE_OFF},
                                                .inputs = {.id = CANOPY_TRACE_OFF},
+                                               .arrivals = {.id = CANOPY_TRACE_OFF},
                                                .health = {.id = CANOPY_TRACE_OFF},
                                                .model = {.id = CANOPY_TRACE_OFF},
                                                .health_every = 1,
@@ -96,6 +102,8 @@ void setUp(void)
     }
     app = (canopy_app_t){.name = "limits",
                          .period = PERIOD_US,
+                         .rx_max = 8,
+                         .frame_us = 220,
                          .tree = &tree,
                          .bus = &bus,
                          .trace = &no_trace,
@@ -105,7 +113,8 @@ void setUp(void)
                          .input = &image,
                          .output = &image,
                          .rx = &rx_state,
-                         .tx_counters = &tx_counter,
+                         .tx = &transmit,
+                         .tx_memory = {.slots = &slot, .data = tx_data, .trace = waiting, .trace_capacity = 1},
                          .trace_state = &trace_state,
                          .sent = &sent};
     config = (canopy_loop_config_t){.app = &app, .can = &fake_can, .clock = &fake_clock};
@@ -141,14 +150,22 @@ static void an_incomplete_configuration_is_refused(void)
     INCOMPLETE(app.input = NULL);
     INCOMPLETE(app.output = NULL);
     INCOMPLETE(app.rx = NULL);
-    INCOMPLETE(app.tx_counters = NULL);
+    INCOMPLETE(app.tx = NULL);
+    INCOMPLETE(app.tx_memory.slots = NULL);
+    INCOMPLETE(app.tx_memory.data = NULL);
+    INCOMPLETE(app.tx_memory.trace = NULL);
+    INCOMPLETE(app.tx_memory.trace_capacity = 0);
+    INCOMPLETE(app.tx_memory.trace_capacity = 3);
+    INCOMPLETE(app.rx_max = 0);
+    INCOMPLETE(app.frame_us = 0);
     INCOMPLETE(app.trace_state = NULL);
     INCOMPLETE(app.sent = NULL);
 }
 
 static void a_bus_without_messages_needs_no_state_for_them(void)
 {
-    app.tx_counters = NULL;
+    app.tx_memory.slots = NULL;
+    app.tx_memory.data = NULL;
     app.bus = &mute_bus;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
     app.bus = &silent_bus;
@@ -326,15 +343,16 @@ static void counters_stay_at_their_largest_value(void)
                                                  .change = {.id = CANOPY_TRACE_OFF},
                                                  .snapshot = {.id = CANOPY_TRACE_OFF},
                                                  .inputs = {.id = CANOPY_TRACE_OFF},
+                                                 .arrivals = {.id = CANOPY_TRACE_OFF},
                                                  .health = {.id = 7},
                                                  .model = {.id = CANOPY_TRACE_OFF},
                                                  .health_every = 1};
 
     app.trace = &health;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
-    bus_state.counters = (canopy_bus_counters_t){
-        .unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1, .tx_dropped = UINT32_MAX};
-    trace_state.tx_dropped = 1;
+    bus_state.counters = (canopy_bus_counters_t){.unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1};
+    transmit.replaced = UINT32_MAX;
+    transmit.trace_late = 1;
     canopy_bus_receive(&bus_state, &unknown, 0);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, bus_state.counters.unknown_id);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, canopy_bus_rejected(&bus_state.counters));

@@ -12,7 +12,7 @@
 #include "nao_home_app.h"
 #include "unity.h"
 
-enum { INPUTS_ID = 0x604, SENSOR_ID = 0x100, FRAMES_MAX = 400, TICKS = 30 };
+enum { INPUTS_ID = 0x604, ARRIVALS_ID = 0x606, SENSOR_ID = 0x100, FRAMES_MAX = 340, TICKS = 30 };
 
 /* A record in memory, and what was sent. */
 static struct {
@@ -46,7 +46,7 @@ static int write_tape(void *context, const canopy_can_frame_t *frame)
 }
 
 static const canopy_replay_io_t io = {.context = &tape, .read = read_tape, .write = write_tape};
-static const canopy_trace_id_t inputs = {.id = INPUTS_ID};
+static const canopy_trace_config_t trace = {.inputs = {.id = INPUTS_ID}, .arrivals = {.id = ARRIVALS_ID}};
 
 void setUp(void)
 {
@@ -80,6 +80,12 @@ static void put_tick(canopy_time_t now)
 static void put_sensor(uint8_t value)
 {
     put((canopy_can_frame_t){.id = SENSOR_ID, .length = 1, .data = {value}});
+}
+
+static void put_arrivals(uint8_t conditions, uint16_t age_ms)
+{
+    put((canopy_can_frame_t){
+        .id = ARRIVALS_ID, .length = 8, .data = {conditions, (uint8_t)(age_ms & 0xFFu), (uint8_t)(age_ms >> 8)}});
 }
 
 static canopy_time_t now(void)
@@ -118,7 +124,7 @@ static void a_tick_gets_its_frames_at_its_time(void)
     put_tick(UINT64_C(0xA1A2A3A4A5A7));
     put_tick(UINT64_C(0xA1A2A3A4FFFF));
     put_sensor(3);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
     TEST_ASSERT_TRUE(now() == UINT64_C(0xA1A2A3A4A5A6)); /* the loop's first deadline */
     expect_no_frame();
     TEST_ASSERT_TRUE(wait_until(now()));
@@ -151,7 +157,7 @@ static void what_a_tick_does_not_take_is_not_for_the_next(void)
     put_sensor(2);
     put_tick(2);
     put_sensor(3);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
     TEST_ASSERT_TRUE(wait_until(0));
     expect_sensor(1);
     TEST_ASSERT_TRUE(wait_until(0));
@@ -160,12 +166,88 @@ static void what_a_tick_does_not_take_is_not_for_the_next(void)
     TEST_ASSERT_EQUAL_UINT32(1, stats.rx_dropped);
 }
 
+static canopy_time_t take_time(void)
+{
+    canopy_can_frame_t frame;
+
+    TEST_ASSERT_EQUAL(1, replay.can.receive(replay.can.context, &frame));
+    return frame.time;
+}
+
+static void expect_conditions(unsigned can_state, bool overload, bool returning)
+{
+    canopy_can_conditions_t conditions;
+
+    replay.can.conditions(replay.can.context, &conditions);
+    TEST_ASSERT_EQUAL_UINT(can_state, conditions.can_state);
+    TEST_ASSERT_EQUAL(overload, conditions.overload);
+    TEST_ASSERT_EQUAL(returning, conditions.returning);
+}
+
+static void each_frame_is_as_old_as_it_was(void)
+{
+    put_tick(1000000);
+    put_sensor(1); /* before any CanopyArrivals: of age 0 */
+    put_arrivals(0, 7);
+    put_sensor(2);
+    put_sensor(3);
+    put_arrivals(0, UINT16_MAX);
+    put_sensor(4);
+    put_tick(2000000);
+    put_sensor(5);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
+    TEST_ASSERT_TRUE(wait_until(0));
+    TEST_ASSERT_TRUE(take_time() == 1000000);
+    TEST_ASSERT_TRUE(take_time() == 993000);
+    TEST_ASSERT_TRUE(take_time() == 993000);
+    TEST_ASSERT_TRUE(take_time() == UINT64_C(1000000) - UINT64_C(65535000));
+    expect_no_frame();
+    TEST_ASSERT_TRUE(wait_until(0));
+    TEST_ASSERT_TRUE(take_time() == 2000000);
+}
+
+static void the_bus_is_in_the_state_in_which_it_was(void)
+{
+    canopy_can_stats_t stats;
+
+    put_tick(1);
+    put_tick(2);
+    put_arrivals(CANOPY_CAN_BUS_OFF | 0x40, 0);
+    put_tick(3);
+    put_sensor(1);
+    put_tick(4);
+    put_arrivals(CANOPY_CAN_DOWN, 0);
+    put_sensor(1);
+    put_arrivals(CANOPY_CAN_BLOCKED | 8 | 0x10, 0); /* the last one of a tick counts */
+    put_tick(5);
+    put_arrivals(CANOPY_CAN_ERROR_ACTIVE, 0);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_no_frame();
+    expect_conditions(CANOPY_CAN_ERROR_ACTIVE, false, false);
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_no_frame();
+    expect_conditions(CANOPY_CAN_BUS_OFF, false, true);
+    TEST_ASSERT_TRUE(wait_until(0)); /* without a CanopyArrivals: as before */
+    expect_sensor(1);
+    expect_conditions(CANOPY_CAN_BUS_OFF, false, true);
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_sensor(1);
+    expect_conditions(CANOPY_CAN_BLOCKED, true, false); /* also when the loop has not asked for a frame more */
+    TEST_ASSERT_TRUE(wait_until(0));
+    expect_no_frame();
+    expect_conditions(CANOPY_CAN_ERROR_ACTIVE, false, false);
+    TEST_ASSERT_FALSE(wait_until(0));
+    replay.can.stats(replay.can.context, &stats);
+    TEST_ASSERT_EQUAL_UINT32(0, stats.rx_dropped);
+}
+
 static void only_the_applications_own_message_begins_a_tick(void)
 {
     put_tick(1);
     put((canopy_can_frame_t){.id = INPUTS_ID, .flags = CANOPY_CAN_EXTENDED, .length = 8});
     put((canopy_can_frame_t){.id = INPUTS_ID, .length = 7});
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
     TEST_ASSERT_TRUE(wait_until(0));
     for (unsigned frame = 0; frame < 2u; frame++) {
         canopy_can_frame_t taken;
@@ -178,18 +260,21 @@ static void only_the_applications_own_message_begins_a_tick(void)
 
 static void what_cannot_be_replayed_is_refused(void)
 {
-    const canopy_trace_id_t off = {.id = CANOPY_TRACE_OFF};
+    const canopy_trace_config_t no_inputs = {.inputs = {.id = CANOPY_TRACE_OFF}, .arrivals = {.id = ARRIVALS_ID}};
+    const canopy_trace_config_t no_arrivals = {.inputs = {.id = INPUTS_ID}, .arrivals = {.id = CANOPY_TRACE_OFF}};
     const canopy_replay_io_t nothing = {.context = &tape};
 
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(NULL, &io, inputs));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, NULL, inputs));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, &nothing, inputs));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED, canopy_replay_init(&replay, &io, off));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, inputs)); /* empty */
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(NULL, &io, &trace));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, NULL, &trace));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, &nothing, &trace));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_replay_init(&replay, &io, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED, canopy_replay_init(&replay, &io, &no_inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED, canopy_replay_init(&replay, &io, &no_arrivals));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, &trace)); /* empty */
     put_sensor(1);
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_replay_init(&replay, &io, &trace));
     tape.end = CANOPY_ERROR_IO;
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_init(&replay, &io, &trace));
 }
 
 static void an_error_ends_the_replay_and_is_told(void)
@@ -200,9 +285,9 @@ static void an_error_ends_the_replay_and_is_told(void)
     put_tick(1);
     put_tick(2);
     tape.end = CANOPY_ERROR_IO;
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
     TEST_ASSERT_TRUE(wait_until(0));
-    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, 0, &frame));
     TEST_ASSERT_TRUE(wait_until(0));
     expect_no_frame();
     TEST_ASSERT_FALSE(wait_until(0));
@@ -212,9 +297,9 @@ static void an_error_ends_the_replay_and_is_told(void)
     put_tick(1);
     put_tick(2);
     tape.write_result = CANOPY_ERROR_BUS_DOWN;
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, &trace));
     TEST_ASSERT_TRUE(wait_until(0));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, replay.can.send(replay.can.context, 0, &frame));
     TEST_ASSERT_FALSE(wait_until(0));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, canopy_replay_error(&replay));
     replay.can.stats(replay.can.context, &stats);
@@ -228,8 +313,8 @@ static void nobody_need_look_at_what_is_sent(void)
     const canopy_can_frame_t frame = {.id = 1};
 
     put_tick(1);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &deaf, inputs));
-    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, &frame));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &deaf, &trace));
+    TEST_ASSERT_EQUAL(1, replay.can.send(replay.can.context, 0, &frame));
     TEST_ASSERT_EQUAL_UINT(0, tape.sent_count);
 }
 
@@ -238,43 +323,68 @@ static void nobody_need_look_at_what_is_sent(void)
 static nao_in_process_t run;
 static canopy_can_frame_t recorded[FRAMES_MAX];
 
-/** Runs the mission with a silent spell; puts what came in on the tape, and keeps what went out. @return frames kept. */
+static canopy_can_frame_t taken[4]; /* of the tick at hand */
+static unsigned taken_count;
+
+/** Puts the frames of a tick on the tape, each behind its age: the ages in CanopyArrivals are in the table's order. */
+static void put_taken(const canopy_can_frame_t *arrivals)
+{
+    canopy_can_frame_t one = *arrivals;
+
+    if (taken_count == 0u) {
+        put(one);
+    }
+    for (unsigned place = 0; place < taken_count; place++) {
+        unsigned index = taken[place].id == nao_home_bus.rx[0].id ? 0u : 1u;
+
+        one.data[1] = arrivals->data[1u + 2u * index];
+        one.data[2] = arrivals->data[2u + 2u * index];
+        put(one);
+        put(taken[place]);
+    }
+    taken_count = 0;
+}
+
+/** One cycle of the mission with a silent spell, late and once so late that its messages are stale. */
+static void run_mission(unsigned tick)
+{
+    run.now += tick % 3u == 1u ? 777u : 0u;
+    run.now += tick == 6u ? 600000u : 0u;
+    run.age = (canopy_time_t)(tick % 4u) * 1300u;
+    if (tick == 6u) {
+        (void)canopy_loop_cycle(&run.loop, run.now); /* the robot is silent */
+        run.now += 50000u;
+    } else {
+        (void)nao_in_process_tick(&run);
+    }
+}
+
+/** Runs the mission; puts what came in on the tape, and keeps what went out. @return frames kept. */
 static unsigned record_the_mission(void)
 {
     static canopy_can_frame_t queue[32];
     static canopy_loopback_endpoint_t ear;
     canopy_can_frame_t frame;
-    canopy_can_frame_t taken[4];
     unsigned kept = 0;
 
     TEST_ASSERT_EQUAL(CANOPY_OK, nao_in_process_init(&run, &nao_home_app));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&run.bus, &ear, queue, 32, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&run.bus, &ear, queue, 32, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, 500, 0));
     run.now = UINT64_C(123456789);
     for (unsigned tick = 0; tick < (unsigned)TICKS; tick++) {
-        unsigned count = 0;
-
-        run.now += tick % 3u == 1u ? 777u : 0u; /* late, and once so late that its messages are stale */
-        run.now += tick == 6u ? 600000u : 0u;
-        if (tick == 6u) {
-            (void)canopy_loop_cycle(&run.loop, run.now); /* the robot is silent */
-            run.now += 50000u;
-        } else {
-            (void)nao_in_process_tick(&run);
-        }
+        run_mission(tick);
         while (ear.can.receive(ear.can.context, &frame) == 1) {
             if (frame.id == nao_home_bus.rx[0].id || frame.id == nao_home_bus.rx[1].id) {
-                TEST_ASSERT_LESS_THAN_UINT(4, count);
-                taken[count++] = frame;
+                TEST_ASSERT_LESS_THAN_UINT(4, taken_count);
+                taken[taken_count++] = frame;
                 continue;
             }
             TEST_ASSERT_LESS_THAN_UINT(FRAMES_MAX, kept);
             recorded[kept++] = frame;
             if (frame.id == INPUTS_ID) {
                 put(frame);
-                for (unsigned place = 0; place < count; place++) {
-                    put(taken[place]);
-                }
+            } else if (frame.id == ARRIVALS_ID) {
+                put_taken(&frame);
             }
         }
     }
@@ -288,10 +398,10 @@ static void a_recorded_run_is_replayed_bit_for_bit(void)
     unsigned kept = record_the_mission();
 
     TEST_ASSERT_EQUAL_UINT32(1, nao_home_app.bus_state->counters.timeouts / 2u); /* both messages, once */
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, nao_home_app.trace->inputs));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_init(&replay, &io, nao_home_app.trace));
     config = (canopy_loop_config_t){.app = &nao_home_app, .can = &replay.can, .clock = &replay.clock};
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
-    canopy_loop_run(&loop);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_run(&loop));
     TEST_ASSERT_EQUAL_UINT32(TICKS, loop.ticks);
     TEST_ASSERT_EQUAL_UINT(kept + 2u, tape.sent_count); /* the safe commands at the end */
     for (unsigned frame = 0; frame < kept; frame++) {
@@ -309,6 +419,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(a_tick_gets_its_frames_at_its_time);
     RUN_TEST(what_a_tick_does_not_take_is_not_for_the_next);
+    RUN_TEST(each_frame_is_as_old_as_it_was);
+    RUN_TEST(the_bus_is_in_the_state_in_which_it_was);
     RUN_TEST(only_the_applications_own_message_begins_a_tick);
     RUN_TEST(what_cannot_be_replayed_is_refused);
     RUN_TEST(an_error_ends_the_replay_and_is_told);

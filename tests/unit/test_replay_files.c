@@ -11,9 +11,10 @@
 #include "canopy/clock/replay_files.h"
 #include "unity.h"
 
-enum { INPUTS_ID = 0x604 };
+enum { INPUTS_ID = 0x604, ARRIVALS_ID = 0x606 };
 
-static const canopy_trace_id_t inputs = {.id = INPUTS_ID};
+static const canopy_trace_config_t trace = {.inputs = {.id = INPUTS_ID}, .arrivals = {.id = ARRIVALS_ID}};
+static const canopy_trace_config_t untold = {.inputs = {.id = INPUTS_ID}, .arrivals = {.id = CANOPY_TRACE_OFF}};
 static canopy_replay_files_t files;
 static char message[CANOPY_REPLAY_MESSAGE];
 static char folder[64];
@@ -52,7 +53,7 @@ static void append(const uint8_t *bytes, size_t size)
 
 static canopy_error_t open_files(const char *to)
 {
-    return canopy_replay_open(&files, record, to, inputs, message, sizeof message);
+    return canopy_replay_open(&files, record, to, &trace, message, sizeof message);
 }
 
 static void test_frames_come_and_go_as_they_are(void)
@@ -73,7 +74,7 @@ static void test_frames_come_and_go_as_they_are(void)
     TEST_ASSERT_EQUAL_HEX32(0x100, frame.id);
     TEST_ASSERT_EQUAL_UINT8(2, frame.length);
     TEST_ASSERT_EQUAL_HEX8(0xCD, frame.data[1]);
-    TEST_ASSERT_EQUAL(1, can->send(can->context, &frame));
+    TEST_ASSERT_EQUAL(1, can->send(can->context, 0, &frame));
     TEST_ASSERT_EQUAL(1, can->receive(can->context, &frame));
     TEST_ASSERT_EQUAL_HEX8(CANOPY_CAN_REMOTE, frame.flags);
     TEST_ASSERT_EQUAL_UINT8(8, frame.length);
@@ -93,7 +94,7 @@ static void test_nothing_need_be_written(void)
 
     append(tick, sizeof tick);
     TEST_ASSERT_EQUAL(CANOPY_OK, open_files(NULL));
-    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_close(&files));
 }
 
@@ -119,9 +120,8 @@ static void test_what_cannot_be_opened_says_why(void)
     append(tick, sizeof tick);
     (void)snprintf(sent, sizeof sent, "%s/none/sent", folder);
     expect_refused(CANOPY_ERROR_IO, sent);
-    TEST_ASSERT_EQUAL(
-        CANOPY_ERROR_UNSUPPORTED,
-        canopy_replay_open(&files, record, NULL, (canopy_trace_id_t){.id = CANOPY_TRACE_OFF}, message, sizeof message));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_UNSUPPORTED,
+                      canopy_replay_open(&files, record, NULL, &untold, message, sizeof message));
     TEST_ASSERT_NOT_NULL(strstr(message, "CanopyInputs"));
 }
 
@@ -142,8 +142,8 @@ static void test_a_full_disk_is_told(void)
     const canopy_can_frame_t frame = {.id = 1};
 
     append(tick, sizeof tick);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_open(&files, record, "/dev/full", inputs, message, sizeof message));
-    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, &frame)); /* into the buffer */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_replay_open(&files, record, "/dev/full", &trace, message, sizeof message));
+    TEST_ASSERT_EQUAL(1, files.replay.can.send(files.replay.can.context, 0, &frame)); /* into the buffer */
     TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_replay_close(&files));
 }
 

@@ -25,6 +25,7 @@ static sent_t sent[] = {
     {ECHO_ID, 120, 0, 0},        {0x600, 10, 0, 0},          {0x602, 10, 0, 0},
     {0x603, 400, 0, 0},          {0x610, 40, 0, 0},          {0x612, 40, 0, 0},
     {0x613, 400, 0, 0},          {0x614, 40, 0, 0},          {0x615, 400, 0, 0},
+    {0x616, 40, 0, 0},
 };
 enum { KINDS = sizeof sent / sizeof sent[0] };
 
@@ -45,14 +46,16 @@ static int controller_receive(void *context, canopy_can_frame_t *frame)
     if (time_now < next_wheels) {
         return 0;
     }
+    *frame = (canopy_can_frame_t){
+        .time = next_wheels, .id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     next_wheels += 10 * MS;
-    *frame = (canopy_can_frame_t){.id = DRIVER_WHEELS_ID, .length = DRIVER_WHEELS_LENGTH, .data = {100, 0, 0}};
     return 1;
 }
 
-static int controller_send(void *context, const canopy_can_frame_t *frame)
+static int controller_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     if (ended) {
         last_commands++;
         unsafe += frame->data[0] != 0u ? 1u : 0u;
@@ -127,8 +130,9 @@ void setUp(void)
         sent[kind].count = 0;
     }
     bus = (canopy_loopback_t){.controller = &controller};
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &driver_end, driver_queue, QUEUE, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loopback_join(&bus, &driver_end, driver_queue, QUEUE, driver_app.acceptance));
+    TEST_ASSERT_EQUAL(CANOPY_OK,
+                      canopy_loopback_join(&bus, &navigator_end, navigator_queue, QUEUE, navigator_app.acceptance));
     driver_config.after_cycle = NULL;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&driver, &driver_config));
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&navigator, &navigator_config));

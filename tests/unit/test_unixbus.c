@@ -78,7 +78,7 @@ static void open_bus(canopy_unixbus_t *bus, const canopy_can_acceptance_t *accep
 static int send_id(canopy_unixbus_t *bus, uint32_t id)
 {
     const canopy_can_frame_t frame = {.id = id, .length = 1, .data = {(uint8_t)id}};
-    return bus->can.send(bus->can.context, &frame);
+    return bus->can.send(bus->can.context, 0, &frame);
 }
 
 static canopy_can_frame_t receive_waiting(canopy_unixbus_t *bus)
@@ -141,8 +141,8 @@ static void send_bytes(const void *bytes, size_t size)
 
 static void test_frames_go_both_ways_and_not_to_the_sender(void)
 {
-    open_bus(&a, NULL);
-    open_bus(&b, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
 
     TEST_ASSERT_EQUAL(1, send_id(&a, 0x123));
     TEST_ASSERT_EQUAL_HEX32(0x123, receive_waiting(&b).id);
@@ -164,11 +164,11 @@ static void test_every_kind_of_frame_arrives_as_it_was_sent(void)
         {.id = 0x456, .flags = CANOPY_CAN_FD | CANOPY_CAN_BITRATE_SWITCH | CANOPY_CAN_ERROR_STATE, .length = 64},
     };
     memset(frames[3].data, 0xA5, 64);
-    open_bus(&a, NULL);
-    open_bus(&b, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
 
     for (size_t i = 0; i < sizeof frames / sizeof frames[0]; i++) {
-        TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frames[i]));
+        TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frames[i]));
         const canopy_can_frame_t frame = receive_waiting(&b);
         TEST_ASSERT_EQUAL_HEX32(frames[i].id, frame.id);
         TEST_ASSERT_EQUAL_HEX8(frames[i].flags, frame.flags);
@@ -184,10 +184,10 @@ static void test_datagram_is_the_one_of_the_documentation(void)
     static const uint8_t expected[] = {0x01, 0x00, 0x02, 0x00, 0x23, 0x01, 0x00, 0x00, 0x11, 0x22};
     const canopy_can_frame_t frame = {.id = 0x123, .length = 2, .data = {0x11, 0x22}};
     uint8_t bytes[100];
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     const int peer = bare_socket("1-00c0ffee.sock");
 
-    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(sizeof expected, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, sizeof expected);
     (void)close(peer);
@@ -206,14 +206,14 @@ static void test_nothing_but_the_data_reaches_the_bus(void)
     frame.length = 2;
     frame.data[0] = 0x11;
     frame.data[1] = 0x22;
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     const int peer = bare_socket("1-00c0ffee.sock");
-    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(sizeof data, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(data, bytes, sizeof data);
     frame.flags = CANOPY_CAN_REMOTE;
     frame.length = 8;
-    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(1, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(sizeof remote, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(remote, bytes, sizeof remote);
     (void)close(peer);
@@ -228,7 +228,7 @@ static void test_malformed_datagrams_are_counted_and_change_nothing(void)
     } changes[] = {{0, 2}, {1, 64}, {1, CANOPY_CAN_BITRATE_SWITCH}, {2, 3}, {2, 1}, {2, 9}, {3, 1}, {5, 8}};
     uint8_t bytes[200] = {0};
     uint32_t count = 0;
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
 
     for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++, count++) {
         memcpy(bytes, good, sizeof good);
@@ -256,7 +256,7 @@ static void test_filter_and_error_frames(void)
     static const canopy_can_acceptance_t acceptance = {.ids = ids, .count = 2};
     static const uint8_t error[] = {1, CANOPY_CAN_ERROR, 8, 0, 0x40, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     open_bus(&a, &acceptance);
-    open_bus(&b, NULL);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
 
     TEST_ASSERT_EQUAL(1, send_id(&b, 0x101));
     TEST_ASSERT_EQUAL(1, send_id(&b, 0x200));
@@ -271,9 +271,9 @@ static void test_filter_and_error_frames(void)
 static void test_frame_that_no_bus_can_carry_is_refused(void)
 {
     const canopy_can_frame_t frame = {.id = 1, .flags = CANOPY_CAN_FD, .length = 9};
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
 
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, a.can.send(a.can.context, &frame));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, a.can.send(a.can.context, 0, &frame));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, send_id(&a, 0x800));
     TEST_ASSERT_EQUAL_UINT32(2, stats(&a).tx_dropped);
     TEST_ASSERT_EQUAL_UINT32(0, stats(&a).sent);
@@ -282,10 +282,10 @@ static void test_frame_that_no_bus_can_carry_is_refused(void)
 /* Joining and sending within one step of the clock that stamps folders. */
 static void test_newcomers_are_reached_at_once(void)
 {
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     for (uint32_t i = 0; i < 50; i++) {
         TEST_ASSERT_EQUAL(1, send_id(&a, 0x10));
-        open_bus(&b, NULL);
+        open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
         TEST_ASSERT_EQUAL(1, send_id(&a, 0x100 + i));
         TEST_ASSERT_EQUAL_HEX32(0x100 + i, receive_waiting(&b).id);
         canopy_unixbus_close(&b);
@@ -296,7 +296,7 @@ static void test_newcomers_are_reached_at_once(void)
 
 static void test_socket_of_a_dead_participant_is_removed_and_other_files_are_not(void)
 {
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     (void)close(bare_socket("1-00c0ffee.sock"));
     (void)close(bare_socket("stranger.sock"));
     (void)close(bare_socket("1-00c0ffee.new"));
@@ -312,8 +312,8 @@ static void test_full_participant_costs_one_wait_until_it_takes_frames_again(voi
 {
     uint8_t bytes[100];
     uint32_t taken = 0;
-    open_bus(&a, NULL);
-    open_bus(&b, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
     const int peer = bare_socket("1-00c0ffee.sock");
 
     const double start = seconds();
@@ -340,7 +340,7 @@ static void test_full_participant_costs_one_wait_until_it_takes_frames_again(voi
 static void test_several_full_participants_cost_one_wait_together(void)
 {
     int peers[8];
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     for (unsigned i = 0; i < 8; i++) {
         char name[32];
         (void)snprintf(name, sizeof name, "%u-00c0ffee.sock", i);
@@ -363,8 +363,8 @@ static void test_several_full_participants_cost_one_wait_together(void)
 
 static void test_loop_that_does_not_receive_loses_the_newest_and_counts(void)
 {
-    open_bus(&a, NULL);
-    open_bus(&b, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
     for (uint32_t i = 0; i < CANOPY_UNIXBUS_FRAMES + 100u; i++) {
         TEST_ASSERT_EQUAL(1, send_id(&a, i & 0x7FFu));
     }
@@ -381,8 +381,8 @@ static void test_loop_that_does_not_receive_loses_the_newest_and_counts(void)
 
 static void test_wait_lasts_as_long_as_asked(void)
 {
-    open_bus(&a, NULL);
-    open_bus(&b, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
     TEST_ASSERT_EQUAL(1, send_id(&b, 1));
     (void)receive_waiting(&a); /* leaves no event behind that would cut the next wait short */
 
@@ -393,7 +393,7 @@ static void test_wait_lasts_as_long_as_asked(void)
 
 static void test_deleted_folder_is_told(void)
 {
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     TEST_ASSERT_EQUAL(1, send_id(&a, 1));
     (void)each_file(delete_file);
     TEST_ASSERT_EQUAL(CANOPY_ERROR_BUS_DOWN, send_id(&a, 1));
@@ -402,14 +402,98 @@ static void test_deleted_folder_is_told(void)
     TEST_ASSERT_EQUAL_UINT32(2, stats(&a).tx_dropped);
 }
 
+static canopy_can_controller_t state(canopy_unixbus_t *bus)
+{
+    return bus->can.state(bus->can.context);
+}
+
+static void test_a_folder_that_is_gone_is_made_again(void)
+{
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_ACTIVE, state(&a));
+    for (uint32_t round = 0; round < 3u; round++) {
+        (void)each_file(delete_file);
+        TEST_ASSERT_EQUAL(0, rmdir(folder));
+        TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_GONE, state(&a));
+        TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_GONE, state(&a)); /* until somebody restarts it */
+        a.can.restart(a.can.context);
+        TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_ACTIVE, state(&a));
+        b.can.restart(b.can.context);
+        a.can.restart(a.can.context); /* in vain: nothing is wrong */
+        TEST_ASSERT_EQUAL(2, each_file(NULL));
+        TEST_ASSERT_EQUAL(1, send_id(&a, 0x100 + round));
+        TEST_ASSERT_EQUAL_HEX32(0x100 + round, receive_waiting(&b).id);
+        TEST_ASSERT_EQUAL(1, send_id(&b, 0x200 + round));
+        TEST_ASSERT_EQUAL_HEX32(0x200 + round, receive_waiting(&a).id);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, canopy_unixbus_malformed(&a));
+}
+
+static void test_a_folder_that_cannot_be_made_again_stays_gone(void)
+{
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    (void)each_file(delete_file);
+    TEST_ASSERT_EQUAL(0, rmdir(folder));
+    FILE *file = fopen(folder, "w"); /* something else has the name */
+    TEST_ASSERT_NOT_NULL(file);
+    (void)fclose(file);
+    a.can.restart(a.can.context);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_GONE, state(&a));
+    TEST_ASSERT_EQUAL(0, unlink(folder));
+    a.can.restart(a.can.context);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_ACTIVE, state(&a));
+}
+
+static void test_a_frame_that_nobody_took_is_not_out(void)
+{
+    unsigned taken = 0;
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    const int peer = bare_socket("1-00c0ffee.sock");
+
+    while (taken < 10000u && send_id(&a, 1) == 1) {
+        taken++;
+    }
+    TEST_ASSERT_EQUAL(0, send_id(&a, 1));
+    TEST_ASSERT_EQUAL_UINT32(taken, stats(&a).sent);
+    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).tx_dropped); /* it may be offered again */
+    (void)close(peer);
+    TEST_ASSERT_EQUAL(1, send_id(&a, 1)); /* nobody is there: nobody misses it */
+}
+
+static void test_frames_say_when_they_were_sent(void)
+{
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
+    for (uint32_t round = 0; round < 20u; round++) {
+        const double before = seconds();
+        TEST_ASSERT_EQUAL(1, send_id(&a, round));
+        const double after = seconds();
+        (void)nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+        const double came = 1e-6 * (double)receive_waiting(&b).time;
+        TEST_ASSERT_TRUE_MESSAGE(came < after + 1e-5, "younger than it is");
+        TEST_ASSERT_TRUE_MESSAGE(came > before - 0.1, "much older than it is");
+    }
+}
+
+static void test_a_filter_leaves_nothing_unknown(void)
+{
+    static const uint32_t ids[] = {1};
+    static const canopy_can_acceptance_t acceptance = {.ids = ids, .count = 1};
+    open_bus(&a, &acceptance);
+    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
+    TEST_ASSERT_TRUE(a.can.is_filtered);
+    TEST_ASSERT_FALSE(b.can.is_filtered);
+}
+
 static void test_close_removes_the_socket_and_can_be_repeated(void)
 {
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     TEST_ASSERT_EQUAL(1, each_file(NULL));
     canopy_unixbus_close(&a);
     canopy_unixbus_close(&a);
     TEST_ASSERT_EQUAL(0, each_file(NULL));
-    open_bus(&a, NULL);
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
     TEST_ASSERT_EQUAL(1, each_file(NULL));
 }
 
@@ -420,23 +504,23 @@ static void test_open_refuses_bad_names(void)
     memset(name, 'x', sizeof name);
     name[sizeof name - 1] = '\0';
 
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, NULL, NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "", NULL));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "..", NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, NULL, CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "", CANOPY_CAN_ACCEPT_EVERYTHING));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "..", CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, "bus0", &bad));
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(ENAMETOOLONG, errno);
     name[90 - strlen(base)] = '\0'; /* the folder's path fits, the socket's does not */
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_unixbus_open(&a, name, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(ENAMETOOLONG, errno);
     (void)snprintf(folder, sizeof folder, "%.60s/none/bus", base);
-    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_unixbus_open(&a, folder, NULL));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_NOT_FOUND, canopy_unixbus_open(&a, folder, CANOPY_CAN_ACCEPT_EVERYTHING));
 }
 
 static void test_path_names_the_folder_itself(void)
 {
-    open_bus(&a, NULL);
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_unixbus_open(&b, folder, NULL));
+    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_unixbus_open(&b, folder, CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(1, send_id(&a, 0x42));
     TEST_ASSERT_EQUAL_HEX32(0x42, receive_waiting(&b).id);
     struct stat status;
@@ -461,6 +545,11 @@ int main(void)
     RUN_TEST(test_loop_that_does_not_receive_loses_the_newest_and_counts);
     RUN_TEST(test_wait_lasts_as_long_as_asked);
     RUN_TEST(test_deleted_folder_is_told);
+    RUN_TEST(test_a_folder_that_is_gone_is_made_again);
+    RUN_TEST(test_a_folder_that_cannot_be_made_again_stays_gone);
+    RUN_TEST(test_a_frame_that_nobody_took_is_not_out);
+    RUN_TEST(test_frames_say_when_they_were_sent);
+    RUN_TEST(test_a_filter_leaves_nothing_unknown);
     RUN_TEST(test_close_removes_the_socket_and_can_be_repeated);
     RUN_TEST(test_open_refuses_bad_names);
     RUN_TEST(test_path_names_the_folder_itself);

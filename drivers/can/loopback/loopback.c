@@ -5,6 +5,8 @@
  */
 #include "canopy/can/loopback.h"
 
+#include "loopback_internal.h"
+
 static void hand_to_others(const canopy_loopback_endpoint_t *self, const canopy_can_frame_t *frame)
 {
     for (canopy_loopback_endpoint_t *peer = self->bus->first; peer != NULL; peer = peer->next) {
@@ -48,33 +50,100 @@ static int loopback_receive(void *context, canopy_can_frame_t *frame)
     return result;
 }
 
-static int loopback_send(void *context, const canopy_can_frame_t *frame)
+void canopy_loopback_settle(canopy_loopback_endpoint_t *self, canopy_can_outcome_t outcome)
+{
+    self->outcome = outcome;
+    self->giving = false;
+    self->dropping = false;
+    if (outcome == CANOPY_CAN_SENT) {
+        self->sent++;
+        hand_to_others(self, &self->held);
+    } else {
+        self->tx_dropped++;
+    }
+}
+
+static int loopback_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     canopy_loopback_endpoint_t *self = context;
+
+    (void)mailbox;
     if (self->bus == NULL || !canopy_can_frame_can_be_sent(frame)) {
         self->tx_dropped++;
         return self->bus == NULL ? CANOPY_ERROR_BUS_DOWN : CANOPY_ERROR_ARGUMENT;
     }
-    const canopy_can_t *controller = self->bus->controller;
-    const int result = controller != NULL ? controller->send(controller->context, frame) : 1;
-    if (result != 1) {
-        self->tx_dropped++;
-        return result;
+    if (self->outcome == CANOPY_CAN_PENDING) {
+        return 0;
     }
-    hand_to_others(self, frame);
-    self->sent++;
-    return 1;
+    self->held = *frame;
+    self->error = 0;
+    if (self->bus->controller == NULL) {
+        canopy_loopback_settle(self, CANOPY_CAN_SENT);
+        return 1;
+    }
+    self->outcome = CANOPY_CAN_PENDING;
+    canopy_loopback_service(self->bus);
+    return self->error < 0 ? self->error : 1;
+}
+
+static canopy_can_outcome_t loopback_outcome(void *context, uint8_t mailbox)
+{
+    canopy_loopback_endpoint_t *self = context;
+
+    (void)mailbox;
+    if (self->outcome == CANOPY_CAN_PENDING && self->bus != NULL) {
+        canopy_loopback_service(self->bus);
+    }
+    return self->outcome;
+}
+
+static void loopback_abort(void *context, uint8_t mailbox)
+{
+    canopy_loopback_endpoint_t *self = context;
+
+    (void)mailbox;
+    if (self->outcome == CANOPY_CAN_PENDING && self->bus != NULL) {
+        canopy_loopback_take_back(self);
+    }
+}
+
+static const canopy_can_t *controller_of(const canopy_loopback_endpoint_t *self)
+{
+    return self->bus != NULL ? self->bus->controller : NULL;
+}
+
+static canopy_can_controller_t loopback_state(void *context)
+{
+    const canopy_can_t *controller = controller_of(context);
+
+    return controller != NULL && controller->state != NULL ? controller->state(controller->context)
+                                                           : CANOPY_CAN_CONTROLLER_ACTIVE;
+}
+
+static void loopback_restart(void *context)
+{
+    const canopy_can_t *controller = controller_of(context);
+
+    if (controller != NULL && controller->restart != NULL) {
+        controller->restart(controller->context);
+    }
 }
 
 static void loopback_stats(void *context, canopy_can_stats_t *stats)
 {
     const canopy_loopback_endpoint_t *self = context;
+    const canopy_can_t *controller = controller_of(self);
+    canopy_can_stats_t below = {0};
+
+    if (controller != NULL && controller->stats != NULL) {
+        controller->stats(controller->context, &below);
+    }
     *stats = (canopy_can_stats_t){
         .received = self->received,
         .sent = self->sent,
-        .rx_dropped = canopy_ring_dropped(&self->queue),
+        .rx_dropped = canopy_ring_dropped(&self->queue) + below.rx_dropped,
         .tx_dropped = self->tx_dropped,
-        .error_frames = 0u,
+        .error_frames = below.error_frames,
         .rx_high_water = canopy_ring_high_water(&self->queue),
     };
 }
@@ -83,27 +152,31 @@ canopy_error_t canopy_loopback_join(canopy_loopback_t *bus, canopy_loopback_endp
                                     canopy_can_frame_t *storage, uint32_t capacity,
                                     const canopy_can_acceptance_t *acceptance)
 {
+    canopy_error_t error;
+
     if (bus == NULL || endpoint == NULL || !canopy_can_acceptance_is_valid(acceptance)) {
         return CANOPY_ERROR_ARGUMENT;
     }
-    const canopy_error_t error =
-        canopy_ring_init(&endpoint->queue, storage, (size_t)capacity * sizeof *storage, sizeof *storage, capacity);
+    *endpoint = (canopy_loopback_endpoint_t){
+        .can = {.context = endpoint,
+                .receive = loopback_receive,
+                .send = loopback_send,
+                .outcome = loopback_outcome,
+                .abort = loopback_abort,
+                .state = loopback_state,
+                .restart = loopback_restart,
+                .stats = loopback_stats,
+                .mailboxes = 1,
+                .is_filtered = !canopy_can_accepts_everything(acceptance)},
+        .acceptance = acceptance,
+        .outcome = CANOPY_CAN_ABORTED,
+    };
+    error = canopy_ring_init(&endpoint->queue, storage, (size_t)capacity * sizeof *storage, sizeof *storage, capacity);
     if (error != CANOPY_OK) {
         return error;
     }
-    endpoint->can = (canopy_can_t){
-        .context = endpoint,
-        .receive = loopback_receive,
-        .send = loopback_send,
-        .wait = NULL,
-        .stats = loopback_stats,
-    };
     endpoint->bus = bus;
     endpoint->next = bus->first;
-    endpoint->acceptance = acceptance;
-    endpoint->received = 0u;
-    endpoint->sent = 0u;
-    endpoint->tx_dropped = 0u;
     bus->first = endpoint;
     return CANOPY_OK;
 }
@@ -119,6 +192,8 @@ void canopy_loopback_leave(canopy_loopback_endpoint_t *endpoint)
             break;
         }
     }
+    canopy_loopback_disown(endpoint);
+    endpoint->outcome = CANOPY_CAN_ABORTED;
     endpoint->bus = NULL;
     endpoint->next = NULL;
 }

@@ -84,6 +84,11 @@ canopy_error_t canopy_can_open(canopy_can_port_t *port, const char *spec, const 
     return error;
 }
 
+const char *canopy_can_advice(const canopy_can_port_t *port, unsigned number)
+{
+    return port->kind == CANOPY_CAN_OPEN_SOCKETCAN ? canopy_socketcan_advice(&port->driver.socketcan, number) : NULL;
+}
+
 void canopy_can_close(canopy_can_port_t *port)
 {
     switch (port->kind) {

@@ -6,8 +6,10 @@
 #include "canopy/can/unixbus.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <string.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -15,11 +17,11 @@
 
 #include "unixbus_internal.h"
 
+enum { LOOK_MS = 100 };
+
 static int64_t monotonic_us(void)
 {
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+    return canopy_arrival_monotonic() / 1000;
 }
 
 /* Cannot fail but by overflow of the 64-bit count, and then the waiter is awake already. */
@@ -30,13 +32,14 @@ static void wake_loop(const canopy_unixbus_t *self)
     (void)written;
 }
 
-static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_t size)
+static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_t size, int64_t arrived)
 {
     canopy_can_frame_t frame;
     if (!canopy_unixbus_decode(&frame, datagram, size)) {
         atomic_fetch_add_explicit(&self->malformed, 1u, memory_order_relaxed);
         return;
     }
+    frame.time = (canopy_time_t)arrived / 1000u;
     if ((frame.flags & CANOPY_CAN_ERROR) != 0) {
         atomic_fetch_add_explicit(&self->error_frames, 1u, memory_order_relaxed);
     }
@@ -45,24 +48,70 @@ static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_
     }
 }
 
+/* A union, because the control buffer must be aligned for its header. */
+typedef union {
+    struct cmsghdr align;
+    char bytes[CMSG_SPACE(sizeof(struct timespec))];
+} control_t;
+
+/** The kernel's stamp, from when the sender sent [ns]; 0: there is none. */
+static int64_t stamp_of(struct msghdr *message)
+{
+    struct cmsghdr *control = CMSG_FIRSTHDR(message);
+    struct timespec stamp = {0};
+
+    if (control != NULL && control->cmsg_level == SOL_SOCKET && control->cmsg_type == SCM_TIMESTAMPNS) {
+        memcpy(&stamp, CMSG_DATA(control), sizeof stamp);
+    }
+    return (int64_t)stamp.tv_sec * INT64_C(1000000000) + stamp.tv_nsec;
+}
+
+/** Takes a datagram, or finds that the queue is empty: whatever comes later arrived later. @return as recvmsg() */
+static ssize_t take_next(canopy_unixbus_t *self)
+{
+    uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX + 1u]; /* one more: what is too long must not look right */
+    control_t control;
+    struct iovec part = {.iov_base = datagram, .iov_len = sizeof datagram};
+    struct msghdr message = {
+        .msg_iov = &part, .msg_iovlen = 1, .msg_control = control.bytes, .msg_controllen = sizeof control.bytes};
+    const int64_t before = canopy_arrival_monotonic();
+    const ssize_t size = recvmsg(self->socket, &message, MSG_DONTWAIT);
+    const int number = errno;
+    const canopy_arrival_clocks_t clocks = canopy_arrival_clocks(before);
+
+    canopy_arrival_look(&self->arrival, &clocks);
+    if (size > 0 || (size == 0 && stamp_of(&message) != 0)) { /* else the socket was shut down */
+        take_datagram(self, datagram, (size_t)size,
+                      canopy_arrival_of(&self->arrival, stamp_of(&message), clocks.after));
+    } else if (size < 0 && number == EAGAIN) {
+        self->arrival.empty_at = before;
+    }
+    errno = number;
+    return size;
+}
+
 /** The receive "interrupt". Ends when canopy_unixbus_close() shuts the socket's reading side. */
 static void *receive_thread(void *context)
 {
     canopy_unixbus_t *self = context;
-    for (;;) {
-        uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX + 1u]; /* one more: what is too long must not look right */
-        const ssize_t size = recv(self->socket, datagram, sizeof datagram, 0);
-        if (atomic_load(&self->stopping)) {
-            return NULL;
+    struct pollfd descriptor = {.fd = self->socket, .events = POLLIN};
+
+    while (!atomic_load(&self->stopping)) {
+        if (take_next(self) >= 0 || errno == EINTR) {
+            continue;
         }
-        if (size >= 0) {
-            take_datagram(self, datagram, (size_t)size);
-        } else if (errno != EINTR) {
+        if (errno != EAGAIN) {
             atomic_store(&self->failure, errno);
             wake_loop(self);
             return NULL;
         }
+        /*
+         * Not for ever: a poll() that is woken while unixbus_restart() puts another socket under the number looks at the
+         * new one, and goes on waiting for the old one.
+         */
+        (void)poll(&descriptor, 1, LOOK_MS);
     }
+    return NULL;
 }
 
 static int unixbus_receive(void *context, canopy_can_frame_t *frame)
@@ -144,13 +193,14 @@ static delivery_t deliver(canopy_unixbus_t *self, canopy_unixbus_peer_t *peer, c
     return errno == ENOENT || errno == EPIPE ? GONE : LOST;
 }
 
-static int unixbus_send(void *context, const canopy_can_frame_t *frame)
+static int unixbus_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
-    canopy_unixbus_t *self = context;
     uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX];
+    canopy_unixbus_t *self = context;
     uint32_t taken = 0;
     uint32_t lost = 0;
     int64_t end = 0;
+    (void)mailbox;
     if (!canopy_can_frame_can_be_sent(frame)) {
         self->tx_dropped++;
         return CANOPY_ERROR_ARGUMENT;
@@ -172,12 +222,20 @@ static int unixbus_send(void *context, const canopy_can_frame_t *frame)
         }
     }
     lost += self->folder.too_many;
-    self->tx_dropped += lost;
     if (taken == 0u && lost > 0u) {
-        return 0;
+        return 0; /* nobody has it, so it is not out */
     }
+    self->tx_dropped += lost;
     self->sent++;
     return 1;
+}
+
+static canopy_can_controller_t unixbus_state(void *context)
+{
+    canopy_unixbus_t *self = context;
+
+    return canopy_unixbus_folder_refresh(&self->folder) == CANOPY_OK ? CANOPY_CAN_CONTROLLER_ACTIVE
+                                                                     : CANOPY_CAN_CONTROLLER_GONE;
 }
 
 static void unixbus_stats(void *context, canopy_can_stats_t *stats)
@@ -191,6 +249,38 @@ static void unixbus_stats(void *context, canopy_can_stats_t *stats)
         .error_frames = atomic_load_explicit(&self->error_frames, memory_order_relaxed),
         .rx_high_water = canopy_ring_high_water(&self->queue),
     };
+}
+
+/** A socket whose datagrams are stamped. @return its number, or negative with errno */
+static int make_socket(void)
+{
+    const int on = 1;
+    const int made = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+
+    if (made >= 0 && setsockopt(made, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on) != 0) {
+        (void)close(made);
+        return -1;
+    }
+    return made;
+}
+
+/** Joins again, in a folder that is made anew. The thread goes on with a new socket under the old one's number. */
+static void unixbus_restart(void *context)
+{
+    canopy_unixbus_t *self = context;
+    char bus[sizeof self->bus];
+    const int made = unixbus_state(self) == CANOPY_CAN_CONTROLLER_GONE ? make_socket() : -1;
+
+    if (made < 0) {
+        return;
+    }
+    memcpy(bus, self->bus, sizeof bus);
+    if (canopy_unixbus_folder_init(&self->folder, bus) == CANOPY_OK &&
+        canopy_unixbus_folder_join(&self->folder, made) == CANOPY_OK) {
+        (void)shutdown(self->socket, SHUT_RD); /* wakes the thread, which else would wait at the old one for ever */
+        (void)dup3(made, self->socket, O_CLOEXEC);
+    }
+    (void)close(made);
 }
 
 /* The thread starts with all signals blocked: they are for the loop's thread, whose sleep they shall end. */
@@ -222,7 +312,7 @@ static void close_descriptors(canopy_unixbus_t *self)
 
 static canopy_error_t join_bus(canopy_unixbus_t *self)
 {
-    self->socket = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    self->socket = make_socket();
     self->event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (self->socket < 0 || self->event < 0) {
         return CANOPY_ERROR_IO;
@@ -240,6 +330,8 @@ static canopy_error_t join_bus(canopy_unixbus_t *self)
 
 canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, const canopy_can_acceptance_t *acceptance)
 {
+    const canopy_arrival_clocks_t clocks = canopy_arrival_clocks(canopy_arrival_monotonic());
+
     if (self == NULL || bus == NULL || !canopy_can_acceptance_is_valid(acceptance)) {
         errno = EINVAL;
         return CANOPY_ERROR_ARGUMENT;
@@ -248,10 +340,17 @@ canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, cons
         .context = self,
         .receive = unixbus_receive,
         .send = unixbus_send,
+        .state = unixbus_state,
+        .restart = unixbus_restart,
         .wait = unixbus_wait,
         .stats = unixbus_stats,
+        .mailboxes = 1,
+        .is_filtered = !canopy_can_accepts_everything(acceptance),
     };
     self->acceptance = acceptance;
+    (void)strncpy(self->bus, bus, sizeof self->bus - 1u); /* a longer one fits no socket: it is refused below */
+    self->bus[sizeof self->bus - 1u] = '\0';
+    canopy_arrival_start(&self->arrival, &clocks);
     self->socket = -1;
     self->event = -1;
     atomic_init(&self->stopping, false);

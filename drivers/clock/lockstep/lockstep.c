@@ -13,20 +13,103 @@ static int lockstep_receive(void *context, canopy_can_frame_t *frame)
     if (!canopy_ring_pop(&self->queue, frame)) {
         return 0;
     }
+    frame->time = self->now;
     self->received++;
     return 1;
 }
 
-static int lockstep_send(void *context, const canopy_can_frame_t *frame)
+/** Waits a little for the inner driver. @return false: the bound is reached */
+static bool wait_for_inner(canopy_lockstep_t *self, unsigned *polls, unsigned *waits)
+{
+    if (self->inner->wait(self->inner->context, CANOPY_LOCKSTEP_POLL_US) == 0) {
+        (*waits)++;
+    }
+    (*polls)++;
+    return *waits < CANOPY_LOCKSTEP_SEND_WAITS && *polls < CANOPY_LOCKSTEP_SEND_POLLS;
+}
+
+/** What has become of the frame that is with the inner driver; SENT when none is. */
+static canopy_can_outcome_t settle(canopy_lockstep_t *self)
+{
+    const canopy_can_t *inner = self->inner;
+    canopy_can_outcome_t outcome = CANOPY_CAN_SENT;
+
+    if (self->in_flight && inner->outcome != NULL) {
+        outcome = inner->outcome(inner->context, 0);
+    }
+    self->in_flight = outcome == CANOPY_CAN_PENDING;
+    return outcome;
+}
+
+/** One attempt. @return 1 it is out, 0 not yet, negative canopy_error_t */
+static int advance(canopy_lockstep_t *self, const canopy_can_frame_t *frame, bool *taken)
+{
+    canopy_can_outcome_t outcome = settle(self); /* of this frame, or of an earlier one for which the time was over */
+    int result = 1;
+
+    if (outcome == CANOPY_CAN_PENDING) {
+        return 0;
+    }
+    if (!*taken) {
+        result = self->inner->send(self->inner->context, 0, frame);
+        *taken = result == 1;
+        self->in_flight = *taken;
+        outcome = settle(self);
+    }
+    if (result != 1 || outcome == CANOPY_CAN_PENDING) {
+        return result < 0 ? result : 0;
+    }
+    return outcome == CANOPY_CAN_SENT ? 1 : CANOPY_ERROR_BUS_DOWN;
+}
+
+/**
+ * Sends, and waits until the frame is out: time stands still meanwhile, so nothing may be left to do between two ticks.
+ * Never 0: the loop would try again between two ticks, and take the next step for it.
+ */
+static int lockstep_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
+{
+    canopy_lockstep_t *self = context;
+    unsigned polls = 0;
+    unsigned waits = 0;
+    bool taken = false;
+
+    (void)mailbox;
+    do {
+        int result = advance(self, frame, &taken);
+
+        if (result != 0) {
+            return result;
+        }
+    } while (wait_for_inner(self, &polls, &waits));
+    if (self->in_flight && self->inner->abort != NULL) {
+        self->inner->abort(self->inner->context, 0);
+    }
+    return CANOPY_ERROR_BUS_DOWN;
+}
+
+static canopy_can_controller_t lockstep_state(void *context)
 {
     const canopy_lockstep_t *self = context;
-    return self->inner->send(self->inner->context, frame);
+
+    return self->inner->state != NULL ? self->inner->state(self->inner->context) : CANOPY_CAN_CONTROLLER_ACTIVE;
+}
+
+static void lockstep_restart(void *context)
+{
+    const canopy_lockstep_t *self = context;
+
+    if (self->inner->restart != NULL) {
+        self->inner->restart(self->inner->context);
+    }
 }
 
 static void lockstep_stats(void *context, canopy_can_stats_t *stats)
 {
     const canopy_lockstep_t *self = context;
-    self->inner->stats(self->inner->context, stats);
+    *stats = (canopy_can_stats_t){0};
+    if (self->inner->stats != NULL) {
+        self->inner->stats(self->inner->context, stats);
+    }
     stats->received = self->received;
     stats->rx_dropped += self->overwritten;
     if (stats->rx_high_water < canopy_ring_high_water(&self->queue)) {
@@ -116,8 +199,12 @@ canopy_error_t canopy_lockstep_init(canopy_lockstep_t *self, const canopy_can_t 
         .context = self,
         .receive = lockstep_receive,
         .send = lockstep_send,
+        .state = lockstep_state,
+        .restart = lockstep_restart,
         .wait = NULL,
         .stats = lockstep_stats,
+        .mailboxes = 1,
+        .is_filtered = inner->is_filtered,
     };
     self->clock = (canopy_clock_t){.context = self, .now = lockstep_now, .wait_until = lockstep_wait_until};
     self->inner = inner;
@@ -125,6 +212,7 @@ canopy_error_t canopy_lockstep_init(canopy_lockstep_t *self, const canopy_can_t 
     self->step_id = step_id;
     self->now = 0u;
     self->joined = false;
+    self->in_flight = false;
     self->received = 0u;
     self->overwritten = 0u;
     self->error = CANOPY_OK;

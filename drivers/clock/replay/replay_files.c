@@ -56,7 +56,7 @@ static void close_file(FILE **file)
 }
 
 canopy_error_t canopy_replay_open(canopy_replay_files_t *self, const char *record, const char *sent,
-                                  canopy_trace_id_t inputs, char *message, size_t message_size)
+                                  const canopy_trace_config_t *trace, char *message, size_t message_size)
 {
     const canopy_replay_io_t io = {.context = self, .read = read_frame, .write = sent != NULL ? write_frame : NULL};
     canopy_error_t error;
@@ -66,10 +66,11 @@ canopy_error_t canopy_replay_open(canopy_replay_files_t *self, const char *recor
     if (self->record == NULL) {
         return CANOPY_ERROR_NOT_FOUND;
     }
-    error = canopy_replay_init(&self->replay, &io, inputs);
+    error = canopy_replay_init(&self->replay, &io, trace);
     if (error == CANOPY_ERROR_UNSUPPORTED) {
         (void)snprintf(message, message_size,
-                       "this application sends no CanopyInputs; add the message to its DBC (docs/trace.md)");
+                       "this application does not send both CanopyInputs and CanopyArrivals; add them to its DBC "
+                       "(docs/trace.md)");
     } else if (error != CANOPY_OK) {
         (void)snprintf(message, message_size, "%s: is no record of this application; `canopy replay --keep` makes one",
                        record);

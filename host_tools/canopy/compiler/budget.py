@@ -11,7 +11,9 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
+from canopy.compiler.bounds import Bounds, Others, make_bounds
 from canopy.compiler.bus_reader import Bus, Message
+from canopy.compiler.bus_timing import can_load_percent, trace_capacity, trace_frames
 from canopy.compiler.leaf_c import entry_type, item_type
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.table import Table
@@ -22,6 +24,7 @@ SIZES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int
 NODE_FLASH = 12  # sizeof(canopy_node_t)
 NODE_RAM = 2  # its status, and the one that the trace sent last
 WORD_RAM = 2
+MAILBOXES_MAX = 4  # CANOPY_CAN_MAILBOXES_MAX
 SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
 
 
@@ -66,6 +69,7 @@ class Budget:
     can_load_percent: float
     bitrate: int
     kinds: tuple[KindCost, ...]
+    bounds: Bounds
 
     def as_dict(self) -> dict[str, object]:
         """For the model file."""
@@ -73,8 +77,10 @@ class Budget:
 
 
 def _message_struct(message: Message, *, received: bool) -> tuple[int, int]:
-    flags = 1 + len(message.multiplexed) if received else 0
-    return struct_size([*(scalar(s.c_type) for s in message.signals), *[scalar("bool")] * flags])
+    members = [scalar(signal.c_type) for signal in message.signals]
+    if received:
+        members += [scalar("bool")] * len(message.multiplexed) + [scalar("uint16_t"), scalar("bool")]
+    return struct_size(members)
 
 
 @dataclass(frozen=True)
@@ -87,16 +93,32 @@ class ImageCost:
     tables: int = 0
 
 
-def ram_bytes(table: Table, bus: Bus, images: ImageCost) -> int:
+def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> int:
     """Size of the application's static object: the struct that the template application.c.j2 declares."""
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 5, *[u32] * 9, u8, u8])
-    trace_state = struct_size([pointer, u16, u8, u32])
-    rx_state = struct_size([u64, *[u8] * 4])
-    image_in = struct_size([u64, *(_message_struct(m, received=True) for m in bus.receive)])
+    bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8])
+    trace_state = struct_size([pointer, u16, u8, u8])
+    rx_state = struct_size([u64, *[u8] * 6, u16])
+    tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
+    tx_trace = struct_size([u64, u32, *[u8] * 9])
+    tx_mailbox = struct_size([u64, u32, u16, u8])
+    tx = struct_size(
+        [
+            *[pointer] * 5,
+            u32,
+            u16,
+            u8,
+            *[u32] * 3,
+            *[u8] * 4,
+            u64,
+            array(tx_mailbox, MAILBOXES_MAX),
+            *[u32] * 5,
+        ]
+    )
+    image_in = struct_size([u64, u8, u8, *(_message_struct(m, received=True) for m in bus.receive)])
     image_out = struct_size(
         [array(u32, max(1, -(-outputs // 32))), u32, u8, *(_message_struct(m, received=False) for m in bus.send)]
     )
@@ -105,6 +127,9 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost) -> int:
             instance,
             bus_state,
             trace_state,
+            tx,
+            array(tx_slot, max(1, len(bus.send))),
+            array(tx_trace, trace_capacity(bus, changes_max)),
             image_in,
             image_out,
             entries_size(table),
@@ -112,7 +137,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost) -> int:
             array(u16, max(1, table.words, images.words)),
             array(u8, nodes),
             array(u8, nodes),
-            array(u8, max(1, len(bus.send))),
+            array(u8, max(1, 2 * sum(message.length for message in bus.send))),
             images.memory,
         ]
     )[0]
@@ -165,47 +190,26 @@ def flash_bytes(table: Table, bus: Bus) -> int:
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(_ports_size(use.leaf) * len(use.nodes) for use in table.users)
     rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
-    tx = struct_size([u32, u8, u8, u32, u16, pointer])[0] * len(bus.send)
-    tables = NODE_FLASH * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
+    tx = struct_size([u32, u8, u8, u32, u16, u16, u64, pointer])[0] * len(bus.send)
+    accepted = 4 * len(bus.receive) + 12
+    tables = accepted + NODE_FLASH * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
     numbers = 4 * (len(table.parameters) + len(table.scripts) + len(table.bindings.texts))
     return tables + numbers + ports + rx + tx
 
 
-def frame_bits(length: int, *, extended: bool, fd: bool) -> int:
-    """Bits of a frame on the wire with the most stuff bits, interframe space included.
-
-    Classic: 47 (extended 67) + 8 a byte, and one stuff bit for four of the 34 (54) + 8 a byte that are stuffed
-    (Davis et al., "Controller Area Network (CAN) schedulability analysis", 2007). FD frames are counted at the nominal
-    bit rate: an upper bound.
-    """
-    fixed, stuffed = (67, 54) if extended else (47, 34)
-    return fixed + (8 if fd else 0) + 8 * length + (stuffed + 8 * length - 1) // 4
-
-
-def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> float:
-    """Share of the bit rate that all cyclic messages of the DBC take, with a full trace in every tick."""
-    per_second = sum(
-        frame_bits(length, extended=extended, fd=fd) * 1000 / cycle for length, extended, fd, cycle in bus.load if cycle
-    )
-    for name, frames in (
-        ("CanopyTick", 1),
-        ("CanopyInputs", 1),
-        ("CanopyChange", changes_max),
-        ("CanopySnapshot", 1),
-    ):
-        if name in bus.trace and bus.trace[name].cycle_ms == 0:
-            message = bus.trace[name]
-            per_second += frames * frame_bits(8, extended=message.extended, fd=False) * 1000 / period_ms
-    return round(100 * per_second / bitrate, 2)
-
-
 def make_budget(
-    table: Table, bus: Bus, period_ms: int, changes_max: int, bitrate: int, images: ImageCost | None = None
+    table: Table,
+    bus: Bus,
+    period_ms: int,
+    changes_max: int,
+    bitrate: int,
+    others: Others,
+    images: ImageCost | None = None,
 ) -> Budget:
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     images = images or ImageCost()
     return Budget(
-        ram_bytes=ram_bytes(table, bus, images),
+        ram_bytes=ram_bytes(table, bus, images, changes_max),
         flash_bytes=flash_bytes(table, bus) + images.tables,
         nodes=len(table.rows),
         worst_tick_leaf_calls=sum(len(use.nodes) for use in table.leaves),
@@ -213,4 +217,5 @@ def make_budget(
         can_load_percent=can_load_percent(bus, period_ms, changes_max, bitrate),
         bitrate=bitrate,
         kinds=kind_costs(table),
+        bounds=make_bounds(bus, bitrate, others, trace_frames(bus, changes_max)),
     )

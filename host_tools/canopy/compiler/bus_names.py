@@ -21,11 +21,14 @@ compl concept consteval constexpr constinit const_cast decltype delete dynamic_c
 mutable namespace new noexcept not not_eq nullptr operator or or_eq override private protected public
 reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid typename typeof
 using virtual wchar_t xor xor_eq near far linux unix i386 arm errno data in input length limited out output self
-size value choice fresh int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t
+size value choice fresh age_ms int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t
 """
 _TAKEN = frozenset(_WORDS.split())
-_IMAGE_MEMBERS = ("now", "written", "saturated", "halting")
-_BUS_WORDS = ("bus", "bus_h", "codec_h", "input", "output", "rx_messages", "tx_messages", "output_signals")
+_IMAGE_MEMBERS = ("now", "can_state", "overload", "written", "saturated", "halting")
+_BUS_WORDS = (
+    "bus", "bus_h", "codec_h", "input", "output", "acceptance", "rx_messages", "tx_messages", "tx_bytes",
+    "output_signals",
+)  # fmt: skip
 # What the application's header adds, with the same prefix.
 _APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")
 _MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import click
 
+from canopy.compiler.bounds import BURST, LATENCY_US, LOAD_PERCENT, Bounds, Others, refusal
 from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
@@ -42,6 +43,31 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
     echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
     echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
+    _print_bounds(budget.bounds)
+
+
+def _ms(value_us: int | None) -> str:
+    return f"{-(-value_us // 100) / 10:g} ms" if value_us is not None else "-"
+
+
+def _print_bounds(bounds: Bounds) -> None:
+    others = bounds.others
+    frames = f"{bounds.frames_per_tick} frames, {len(bounds.outputs)} of them commands"
+    echo(f"  sends  {frames}, in the worst tick; with fewer transmit buffers the controller needs its interrupt")
+    echo(f"  with {others.load_percent} % load by others, in bursts of {others.burst} frames:")
+    if bounds.inputs:
+        width = max(len(bound.name) for bound in bounds.inputs)
+        for bound in bounds.inputs:
+            stale = f"stale {_ms(bound.stale_us)} after its last frame" if bound.stale_us else "never stale"
+            echo(f"    {bound.name:{width}}  at most {_ms(bound.age_us)} old at a decision, {stale}")
+    if bounds.outputs:
+        width = max(len(output.name) for output in bounds.outputs)
+        for output in bounds.outputs:
+            safe = f", safe value {_ms(output.safe_us)} after an input is cut" if output.safe_us else ""
+            wait, reaction = _ms(output.wait_us), _ms(output.reaction_us)
+            echo(f"    {output.name:{width}}  out {wait} after its tick, reaction {reaction}{safe}")
+        limit = bounds.load_limit_percent
+        echo(f"    kept up to {limit} % load by others" if limit is not None else "    not kept at any load")
 
 
 package_option = click.option(
@@ -143,6 +169,27 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
 @click.option("--image-nodes", type=in_range(IMAGE_NODES), help="Keep room for tree images of so many nodes.")
 @click.option("--image-uses", type=in_range(IMAGE_USES), help="Of each leaf in an image; 8 if not given.")
 @click.option("--bitrate", default=500_000, show_default=True, type=in_range(BITRATE), help="Of the bus, in bit/s.")
+@click.option(
+    "--foreign-load",
+    default=LOAD_PERCENT,
+    show_default=True,
+    type=click.IntRange(0, 99),
+    help="Share of the bus that frames of others take, in percent; all of them count as more urgent.",
+)
+@click.option(
+    "--foreign-burst",
+    default=BURST,
+    show_default=True,
+    type=click.IntRange(0, 10_000),
+    help="So many frames of others may come in a row on top of that.",
+)
+@click.option(
+    "--tx-latency-us",
+    default=LATENCY_US,
+    show_default=True,
+    type=click.IntRange(0, 1_000_000),
+    help="From a free mailbox to its next frame.",
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -165,6 +212,9 @@ def command(
     image_nodes: int | None,
     image_uses: int | None,
     bitrate: int,
+    foreign_load: int,
+    foreign_burst: int,
+    tx_latency_us: int,
     max_ram: int | None,
     max_flash: int | None,
     costs: bool,
@@ -183,7 +233,13 @@ def command(
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         images = _images(image_nodes, image_uses)
-        application = load_application(name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images)
+        others = Others(foreign_load, foreign_burst, tx_latency_us)
+        application = load_application(
+            name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others
+        )
+        broken = refusal(application.bus, application.budget.bounds)
+        if broken is not None:
+            raise CompileError(Place(str(dbc)), *broken)
         files = render(application)
         first = (
             {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import itertools
 import os
 import re
 from dataclasses import dataclass
@@ -15,8 +16,10 @@ import jinja2
 from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
+from canopy.compiler.bounds import Others
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
+from canopy.compiler.bus_timing import frame_us, frames_in, trace_capacity
 from canopy.compiler.dbc_file import read_dbc
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.generation import PLACEHOLDER, tie
@@ -61,6 +64,7 @@ class Application:
     table: Table
     bus: Bus
     period_ms: int
+    bitrate: int
     budget: Budget
     changes_max: int
     options: Options
@@ -70,6 +74,21 @@ class Application:
     def include(self) -> str | None:
         """The user's header."""
         return self.options.include
+
+    @property
+    def rx_max(self) -> int:
+        """Most frames that the bus can carry in a period."""
+        return frames_in(self.period_ms * 1000, self.bitrate)
+
+    @property
+    def frame_us(self) -> int:
+        """How long a classic frame of 8 bytes takes at most [us]."""
+        return frame_us(self.bitrate)
+
+    @property
+    def trace_capacity(self) -> int:
+        """Trace frames that can wait: those of one tick, rounded up to a power of two."""
+        return trace_capacity(self.bus, self.changes_max)
 
     def every(self, name: str) -> int:
         """The slow trace message of this name is sent in every so-many-th tick."""
@@ -111,6 +130,7 @@ def load_application(
     include: str | None = None,
     options: Options | None = None,
     images: tuple[int, int] | None = None,
+    others: Others | None = None,
 ) -> Application:
     """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
 
@@ -130,8 +150,8 @@ def load_application(
         table = exchangeable(table)
         catalogue = Catalogue(table, make_room(table, *images))
     cost = image_cost(table, catalogue.room) if catalogue is not None else None
-    budget = make_budget(table, bus, period_ms, changes_max, bitrate, cost)
-    return Application(name, table, bus, period_ms, budget, changes_max, options, catalogue)
+    budget = make_budget(table, bus, period_ms, changes_max, bitrate, others or Others(), cost)
+    return Application(name, table, bus, period_ms, bitrate, budget, changes_max, options, catalogue)
 
 
 def _category(row_category: str, kind: str) -> str:
@@ -237,9 +257,11 @@ def environment(bus: Bus) -> jinja2.Environment:
 def render_bus(bus: Bus, period_ms: int) -> dict[str, str]:
     """The bus's two files: images, codecs and tables for canopy/bus.h. File name -> content, for tie()."""
     templates = environment(bus)
+    sizes = [2 * message.length for message in bus.send]
+    places = list(itertools.accumulate(sizes, initial=0))
     return {
         f"{bus.name}_bus.{suffix}": layout(
-            templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms)
+            templates.get_template(f"bus.{suffix}.j2").render(bus=bus, period_ms=period_ms, places=places)
         )
         for suffix in ("h", "c")
     }

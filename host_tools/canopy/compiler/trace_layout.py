@@ -19,6 +19,16 @@ TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
         "Overruns": (56, 8),
     },
     "CanopyInputs": {"Now": (0, 48), "Taken": (48, 8), "Check": (56, 8)},
+    "CanopyArrivals": {
+        "CanState": (0, 3),
+        "Overload": (3, 1),
+        "Count": (4, 2),
+        "Returning": (6, 1),
+        "Age0": (8, 16),
+        "Age1": (24, 16),
+        "Age2": (40, 16),
+        "Tick": (56, 8),
+    },
     "CanopyChange": {
         "Sequence": (0, 8),
         "NodeA": (8, 16),

@@ -43,6 +43,8 @@ class Replayed:
     inputs: int
     """Frames that the controller took."""
     reordered: int
+    unheard: int
+    """Frames of the log that never reached the controller."""
     result: Result
 
 
@@ -80,9 +82,8 @@ def count_ticks(recording: Recording, run: Run, wanted: int | None) -> int:
             f"{recording.path}: has {len(run.ticks)} ticks of this run, not {wanted}: {run.gap or 'it ends there'}"
         )
     if wanted is None and run.gap is not None:
-        raise LogError(
-            f"{recording.path}: {run.gap}; a replay needs all of them; --ticks {len(run.ticks)} replays what is before"
-        )
+        way_out = f"--ticks {len(run.ticks)} replays what is before" if run.ticks else "record again"
+        raise LogError(f"{recording.path}: {run.gap}; a replay needs all of them; {way_out}")
     if not run.ticks:
         raise LogError(f"{recording.path}: has no whole tick of the controller: record for longer")
     return wanted or len(run.ticks)
@@ -105,7 +106,7 @@ def replay(log: Path, model: Model, options: Options) -> Replayed:
         write_record(record, bus, run, inputs)
         run_program(options.program, options.arguments, record.absolute(), sent)
         result = Comparison(bus, run, inputs.ticks).run(read_sent(sent))
-    return Replayed(options.run or 1, len(recording.runs), len(inputs), inputs.reordered, result)
+    return Replayed(options.run or 1, len(recording.runs), len(inputs), inputs.reordered, inputs.unheard, result)
 
 
 def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None:
@@ -114,7 +115,9 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
     if replayed.runs > 1 and options.run is None:
         echo(f"{name}: {log} has {replayed.runs} runs of the controller; this is the first, --run chooses", err=True)
     if not result.differences:
-        echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal")
+        dropped = f"; {result.dropped} more did not leave, as CanopyHealth has counted" if result.dropped else ""
+        unheard = f"; {replayed.unheard} never reached the controller" if replayed.unheard else ""
+        echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal{dropped}{unheard}")
         return
     for difference in result.differences[:_SHOWN]:
         echo(f"{name}: {difference.text()}")
@@ -139,6 +142,7 @@ def _as_json(log: Path, model: Model, replayed: Replayed) -> str:
             "runs": replayed.runs,
             "inputs": replayed.inputs,
             "reordered": replayed.reordered,
+            "unheard": replayed.unheard,
             "equal": not result.differences,
             **result.as_dict(),
         }

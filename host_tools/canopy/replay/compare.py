@@ -1,22 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""What the program sends in a replay, against what the controller sent into the log: bit for bit, by message."""
+"""What the program decides in a replay, against what the controller sent into the log: bit for bit, by message.
+
+The replay sends everything at once. In the recorded run a command may have been replaced, taken back or dropped before
+it left: the log lacks it, and the E2E counters of those that left are others. So commands are compared without their
+E2E bytes, the log's own E2E bytes must be right, and CanopyHealth must have counted what the log lacks.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 
 import can
-from cantools.database.can import Message as DbcMessage
 
-from canopy.replay.log import Bus, Run, Sent, key
-from canopy.trace import status_name
+from canopy.replay import e2e
+from canopy.replay.align import Alignment, Lacking, Replayed, Rules, Same, align, not_counted
+from canopy.replay.explain import explain
+from canopy.replay.log import AHEAD, NEEDED, Bus, Run, Sent, key
 
 NOT_COMPARED = {"CanopyTick": bytes([0] * 7 + [0xFF]), "CanopyHealth": bytes([0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0])}
 """Bits that do not follow from the inputs: Overruns; RxUnknown and TxDropped."""
-_SNAPSHOT_NODES = 10
-_NO_NODE = 0xFFFF
-_NO_STATUS = 15
+_COUNTED_AFTER = AHEAD + 1
+"""Ticks from the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
+of a tick leaves, all commands of the tick have left or were counted."""
+_SATURATED = 0xFFFF
+_LAST = 1 << 62
+"""In the order of the replay's frames: behind all."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +56,8 @@ class Result:
     """Ticks that are equal, from the first one on."""
     frames: int = 0
     """Frames compared."""
+    dropped: int = 0
+    """Frames of these ticks that the log lacks, and that CanopyHealth counts as not sent."""
     differences: list[Difference] = field(default_factory=list)
     """Of the first tick that is not equal."""
 
@@ -55,131 +67,136 @@ class Result:
 
 
 class Comparison:
-    """Feed it the frames of the replay in their order."""
+    """Of a run's first `ticks` ticks."""
 
     def __init__(self, bus: Bus, run: Run, ticks: int) -> None:
         self._bus = bus
         self._run = run
         self._ticks = ticks
-        self._next = dict.fromkeys(bus.sent, 0)
-        self._tick = -1
-        self._result = Result()
-        self._cut = run.gap is None and ticks == len(run.ticks)
+        self._whole = ticks - 1 if run.gap is None and ticks == len(run.ticks) else ticks
+        """Of so many ticks the log has everything: it may end within the last one."""
+        self._counted = run.counted
+        self._found: list[tuple[int, Difference]] = []
+        """With its place in the replay."""
 
     def run(self, frames: Iterable[can.Message]) -> Result:
-        """Compares up to the end of the first tick that differs."""
-        for message in frames:
-            number = key(message.arbitration_id, message.is_extended_id)
-            self._tick += self._bus.trace.get(number) == "CanopyTick"
-            # A command is sent before its tick's CanopyTick.
-            tick = self._tick if number in self._bus.trace else self._tick + 1
-            if tick >= self._ticks:
-                break  # the safe commands at the program's end, whose time nobody knows
-            if self._result.differences and tick > self._result.differences[0].tick:
-                break
-            self._compare(number, bytes(message.data), tick)
-        if not self._result.differences:
-            self._look_for_more()
-        first = self._result.differences
-        self._result.ticks = first[0].tick if first else self._tick_count()
-        return self._result
-
-    def _tick_count(self) -> int:
-        return min(self._tick + 1, self._ticks)
-
-    def _compare(self, number: int, data: bytes, tick: int) -> None:
-        recorded = self._recorded(number)
-        name = self._bus.sent[number].name if number in self._bus.sent else f"0x{number:X}"
-        if recorded is None or recorded.tick > tick:
-            # The log may end within the last tick.
-            if not (self._cut and tick == self._ticks - 1):
-                self._differ(tick, name, "frame", "none", data.hex(" "), None)
-            if recorded is None or not self._same(number, recorded.data, data):
-                return
-        self._next[number] += 1
-        self._result.frames += 1
-        if not self._same(number, recorded.data, data):
-            for what, was, now in self._explain(number, recorded.data, data):
-                self._differ(tick, name, what, was, now, recorded.place)
-
-    def _recorded(self, number: int) -> Sent | None:
-        frames = self._run.sent.get(number, [])
-        place = self._next.get(number, 0)
-        return frames[place] if place < len(frames) else None
-
-    def _same(self, number: int, recorded: bytes, replayed: bytes) -> bool:
-        mask = NOT_COMPARED.get(self._bus.trace.get(number, ""))
-        if mask is None or len(recorded) != len(mask) or len(replayed) != len(mask):
-            return recorded == replayed
-        return all((a ^ b) & ~bits == 0 for a, b, bits in zip(recorded, replayed, mask, strict=True))
-
-    def _differ(self, tick: int, message: str, what: str, recorded: str, replayed: str, frame: int | None) -> None:
-        self._result.differences.append(Difference(tick, message, what, recorded, replayed, frame))
-
-    def _look_for_more(self) -> None:
-        """Frames that the log has and the replay does not send."""
-        done = self._tick_count()
+        """Compares the frames of the replay, given in their order, with the log."""
+        replayed, done = self._sort(frames)
         if done < self._ticks:
-            self._differ(done, "CanopyTick", "frame", "sent", "the program ended", self._run.ticks[done].place)
-            return
-        for number in self._bus.sent:
-            recorded = self._recorded(number)
-            if recorded is not None and recorded.tick < self._ticks:
-                name = self._bus.sent[number].name
-                self._differ(recorded.tick, name, "frame", recorded.data.hex(" "), "none", recorded.place)
+            self._differ(done, 0, "CanopyTick", ("frame", "sent", "the program ended"), self._run.ticks[done].place)
+        alignments = {number: self._align(number, sent) for number, sent in replayed.items()}
+        lacking = []
+        for number, alignment in alignments.items():
+            self._judge(number, alignment, done)
+            lacking += self._lacking(number, alignment, replayed[number])
+        for one in not_counted(lacking, self._counted, _SATURATED):
+            self._differ_lacking(one.message, one.frame)
+        return self._sum_up(done, alignments)
 
-    def _explain(self, number: int, recorded: bytes, replayed: bytes) -> list[tuple[str, str, str]]:
-        """What differs, by signal or by node; the frame's bytes where they cannot be decoded."""
-        kind = self._bus.trace.get(number)
-        if kind in ("CanopyChange", "CanopySnapshot"):
-            read = _changes if kind == "CanopyChange" else _snapshot
-            return self._explain_nodes(read(recorded), read(replayed))
-        message = self._bus.sent[number]
-        was, now = _decode(message, recorded), _decode(message, replayed)
-        names = [name for name in was if was[name] != now.get(name)]
-        values = [name for name in names if not name.startswith("E2E_")] or names
-        found = [(name, was[name], now.get(name, "none")) for name in values]
-        return found or [("frame", recorded.hex(" "), replayed.hex(" "))]
+    def _sum_up(self, done: int, alignments: dict[int, Alignment]) -> Result:
+        first = min((difference.tick for _, difference in self._found), default=None)
+        result = Result(ticks=done if first is None else first)
+        last = self._ticks if first is None else first
+        for alignment in alignments.values():
+            compared = alignment.pairs + alignment.other
+            result.frames += sum(frame.tick <= min(last, self._ticks - 1) for _, frame in compared)
+            result.dropped += sum(frame.tick < min(last, self._whole) for frame in alignment.lacking)
+        self._found.sort(key=lambda found: found[0])
+        result.differences = [difference for _, difference in self._found if difference.tick == first]
+        return result
 
-    def _explain_nodes(self, was: dict[int, str], now: dict[int, str]) -> list[tuple[str, str, str]]:
-        nodes = self._bus.model.nodes
-        found = []
-        for node in sorted(was.keys() | now.keys()):
-            if was.get(node) != now.get(node):
-                name = f"node {node}" + (f" '{nodes[node].name}'" if node < len(nodes) else "")
-                found.append((name, was.get(node, "not in this frame"), now.get(node, "not in this frame")))
-        return found or [("Sequence", "another one", "another one")]
+    def _sort(self, frames: Iterable[can.Message]) -> tuple[dict[int, list[Replayed]], int]:
+        """The replay's frames by message, and how many ticks it has done."""
+        result: dict[int, list[Replayed]] = {number: [] for number in self._bus.sent}
+        done = 0
+        for order, message in enumerate(frames):
+            number = key(message.arbitration_id, message.is_extended_id)
+            done += self._bus.trace.get(number) == "CanopyTick"
+            # A command is sent before its tick's CanopyTick. Those at the program's end are of no tick, and may have
+            # replaced those of the last tick before they left.
+            tick = done - 1 if number in self._bus.trace else done
+            if tick <= self._ticks:
+                result.setdefault(number, []).append(Replayed(order, tick, bytes(message.data)))
+        return result, min(done, self._ticks)
 
+    def _align(self, number: int, replayed: Sequence[Replayed]) -> Alignment:
+        may_lack = 0 if self._is_needed(number) else max((count for _, count in self._counted), default=0)
+        ahead = 0 if number in self._bus.trace else AHEAD
+        rules = Rules(ahead, may_lack, self._whole, self._same(number))
+        recorded = self._run.sent.get(number, [])
+        found = (align(recorded[start:], replayed, rules) for start in self._starts(number, recorded))
+        return min(found, key=Alignment.cost)
 
-def _decode(message: DbcMessage, data: bytes) -> dict[str, str]:
-    try:
-        raw = message.decode_simple(data, decode_choices=False, scaling=False)
-        values = message.decode_simple(data)
-    except Exception:
-        # cantools: too short, an unknown multiplexer
-        return {"frame": data.hex(" ")}
-    return {
-        name: f"{value} ({raw[name]})" if isinstance(value, str) or not isinstance(value, int | float) else f"{value:g}"
-        for name, value in values.items()
-    }
+    def _starts(self, number: int, recorded: Sequence[Sent]) -> list[int]:
+        """Where the run's first frame of a message may be, the most likely place first."""
+        starts = list(range(self._run.doubtful.get(number, 0), -1, -1))
+        if number in self._bus.protected:
+            first = [start for start in starts if start < len(recorded) and not e2e.counter(recorded[start].data)]
+            return first or starts[:1]
+        return starts
 
+    def _same(self, number: int) -> Same:
+        if number in self._bus.protected:
+            return lambda recorded, replayed: e2e.without(recorded) == e2e.without(replayed)
+        mask = NOT_COMPARED.get(self._bus.trace.get(number, ""))
+        if mask is None:
+            return bytes.__eq__
+        bits = int.from_bytes(mask, "little")
+        return lambda recorded, replayed: (
+            len(recorded) == len(replayed)
+            and (int.from_bytes(recorded, "little") ^ int.from_bytes(replayed, "little")) & ~bits == 0
+        )
 
-def _status(code: int) -> str:
-    try:
-        return status_name(code)
-    except ValueError:
-        return f"code {code}"
+    def _judge(self, number: int, alignment: Alignment, done: int) -> None:
+        """Adds the differences that one message shows by itself."""
+        name = self._name(number)
+        for sent, frame in alignment.other:
+            if frame.tick >= self._ticks:
+                continue
+            for what in explain(self._bus, number, sent.data, frame.data):
+                self._differ(frame.tick, frame.order, name, what, sent.place)
+        ahead = 0 if number in self._bus.trace else AHEAD
+        for sent in alignment.extra:
+            if sent.tick + ahead < done:  # else it may be of a tick that is not compared
+                self._differ(sent.tick, _LAST, name, ("frame", sent.data.hex(" "), "none"), sent.place)
+        if self._is_needed(number):
+            for frame in alignment.lacking:
+                if frame.tick < self._whole:
+                    self._differ_lacking(number, frame)
+        if number in self._bus.protected:
+            self._judge_e2e(number, alignment.pairs)
 
+    def _judge_e2e(self, number: int, pairs: Sequence[tuple[Sent, Replayed]]) -> None:
+        """The first frame of the log whose counter does not follow, or whose CRC is wrong, is a difference."""
+        for place, (sent, frame) in enumerate(pairs):
+            counter, crc = place % e2e.COUNTERS, e2e.crc(self._bus.protected[number], sent.data)
+            if (e2e.counter(sent.data), sent.data[0]) != (counter, crc):
+                was, right = e2e.counter(sent.data), counter
+                what = "E2E_Counter"
+                if was == right:
+                    what, was, right = "E2E_CRC", sent.data[0], crc
+                self._differ(frame.tick, frame.order, self._name(number), (what, str(was), str(right)), sent.place)
+                return
 
-def _changes(data: bytes) -> dict[int, str]:
-    pairs = (
-        (int.from_bytes(data[1:3], "little"), data[5] & 15),
-        (int.from_bytes(data[3:5], "little"), data[5] >> 4),
-    )
-    return {node: _status(code) for node, code in pairs if node != _NO_NODE}
+    def _lacking(self, number: int, alignment: Alignment, replayed: Sequence[Replayed]) -> list[Lacking]:
+        """What CanopyHealth must have counted."""
+        if self._is_needed(number):
+            return []
+        following = {frame.order: later.tick for frame, later in pairwise(replayed)}
+        return [
+            Lacking(number, frame, following.get(frame.order, self._ticks) + _COUNTED_AFTER)
+            for frame in alignment.lacking
+            if frame.tick < self._whole
+        ]
 
+    def _is_needed(self, number: int) -> bool:
+        return self._bus.trace.get(number) in NEEDED
 
-def _snapshot(data: bytes) -> dict[int, str]:
-    first = int.from_bytes(data[1:3], "little")
-    codes = [(byte >> shift) & 15 for byte in data[3:] for shift in (0, 4)]
-    return {first + place: _status(code) for place, code in enumerate(codes) if code != _NO_STATUS}
+    def _name(self, number: int) -> str:
+        return self._bus.sent[number].name if number in self._bus.sent else f"0x{number:X}"
+
+    def _differ_lacking(self, number: int, frame: Replayed) -> None:
+        self._differ(frame.tick, frame.order, self._name(number), ("frame", "none", frame.data.hex(" ")), None)
+
+    def _differ(self, tick: int, order: int, message: str, what: tuple[str, str, str], frame: int | None) -> None:
+        self._found.append((order, Difference(tick, message, *what, frame)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which frames of a log each tick has taken, as CanopyInputs tells: so many, with this check.
+"""Which frames of a log each tick has taken, as CanopyInputs and CanopyArrivals tell: so many, with this check, so old.
 
 Where the log's first frame is that the controller has taken, nobody says: the robot may have been sending for long. But
 the checks of the first ticks fit at one place only, unless the frames before it are the same ones anyway.
@@ -7,10 +7,11 @@ the checks of the first ticks fit at one place only, unless the frames before it
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
-from canopy.replay.log import LogError, Recording, Run, Taken, next_check
+from canopy.replay.log import LogError, Recording, Run, Taken
+from canopy.replay.ticks import CHECKED_CONDITIONS, Tick, next_check
 
 _AHEAD = 64
 """On a unixbus a frame may reach the log that much later than the controller's answer to it."""
@@ -22,6 +23,9 @@ _STARTS_MENDED = 16
 _LOST_MAX = 255
 _STEPS_LATER = 8
 _TICKS_CUT = 2
+_TAKEN_WRAPS = 256
+_FRAMES_MAX = 8 * _TAKEN_WRAPS
+"""In one tick. Taken tells only their number modulo 256."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class _Step:
     frames: int
     before: int
     """The check before it."""
-    check: int
+    told: Tick
 
 
 class Inputs:
@@ -46,8 +50,12 @@ class Inputs:
         """
         self.ticks = ticks
         """Ticks whose frames are all there: the log may end before those of the last one or two."""
+        self.ages: list[dict[int, int]] = []
+        """Of each tick the ages of the messages of which it has taken frames [ms], by their key."""
         self.reordered = 0
         """How often two frames of different senders had to change places: a unixbus has not one order for all."""
+        self.unheard = 0
+        """Frames of the log that never reached the controller, which was off the bus or overloaded, and said so."""
         self._path = recording.path
         self._run = run
         self._received = list(recording.received)
@@ -57,6 +65,9 @@ class Inputs:
             self._counts[step.tick] = step.frames
         self._start = self._find_start()
         del self._counts[self.ticks :]
+        self.ages = [
+            dict(zip(_messages(frames), tick.ages, strict=True)) for frames, tick in zip(self, run.ticks, strict=False)
+        ]
 
     def __iter__(self) -> Iterator[tuple[Taken, ...]]:
         """The frames of each tick."""
@@ -95,15 +106,15 @@ class Inputs:
 
     def _mend_from(self, steps: int, start: int) -> LogError | None:
         """Goes on behind so many steps that fit, and mends what can be mended. Else all is as before."""
-        before = list(self._received)
+        before = list(self._received), list(self._steps), list(self._counts)
         place = start + sum(step.frames for step in self._steps[:steps])
-        self.reordered = 0
+        self.reordered = self.unheard = 0
         for index in range(steps, len(self._steps)):
             if self._is_cut(index, place):
                 break
             if not self._fits(index, place) and not self._mend(index, place):
                 error = self._error(index, place)
-                self._received = before
+                self._received, self._steps, self._counts = before
                 return error
             place += self._steps[index].frames
         return None
@@ -120,10 +131,12 @@ class Inputs:
     def _fits(self, index: int, place: int) -> bool:
         step = self._steps[index]
         frames = self._received[place : place + step.frames]
+        if len(frames) != step.frames or len(_messages(frames)) != len(step.told.ages):
+            return False
         check = step.before
         for frame in frames:
             check = next_check(check, frame.fold) if frame.fold is not None else check
-        return len(frames) == step.frames and check == step.check
+        return step.told.check_of_ages(check) == step.told.check
 
     def _follow(self, place: int) -> int:
         """How many steps fit from the first one on, when the first of their frames is at `place`."""
@@ -136,15 +149,30 @@ class Inputs:
         return len(self._steps)
 
     def _is_cut(self, index: int, place: int) -> bool:
-        """Does the log end before these frames, shortly before the run does? Then what is behind is left out."""
+        """Does the log end before these frames, or their ages, and the run soon after? Then the rest is left out."""
         step = self._steps[index]
-        if place + step.frames <= len(self._received) or len(self._counts) - step.tick > _TICKS_CUT:
+        left = len(self._counts) - step.tick
+        frames = self._received[place : place + step.frames]
+        ages_are_cut = left == 1 and self._run.gap is None and len(_messages(frames)) > len(step.told.ages)
+        if left > _TICKS_CUT or (len(frames) == step.frames and not ages_are_cut):
             return False
         self.ticks = step.tick
         return True
 
     def _mend(self, index: int, place: int) -> bool:
-        """Lets two neighbours of different senders change places, where then this step and some further ones fit."""
+        """Finds what fits after all, and some further steps with it.
+
+        That may be more frames than Taken can tell, two neighbours of different senders that change places, or frames
+        that never reached the controller.
+        """
+        step = self._steps[index]
+        most = min(_FRAMES_MAX, len(self._received) - place)
+        for frames in range(step.frames + _TAKEN_WRAPS, most + 1, _TAKEN_WRAPS):
+            self._steps[index] = replace(step, frames=frames)
+            if self._is_sure(index, place, frames + _SURE_BEHIND):
+                self._counts[step.tick] = frames
+                return True
+        self._steps[index] = step
         for first in range(place, min(place + self._steps[index].frames, len(self._received) - 1)):
             a, b = self._received[first], self._received[first + 1]
             if a.sender != b.sender:
@@ -153,6 +181,25 @@ class Inputs:
                     self.reordered += 1
                     return True
                 self._received[first : first + 2] = a, b
+        return self._has_told_losses(index) and self._skip(index, place)
+
+    def _has_told_losses(self, index: int) -> bool:
+        """Was the bus not as it should be in the tick, or in one since the last that took frames?"""
+        first = self._steps[index - 1].tick + 1 if index else 0
+        return any(
+            tick.conditions & CHECKED_CONDITIONS for tick in self._run.ticks[first : self._steps[index].tick + 1]
+        )
+
+    def _skip(self, index: int, place: int) -> bool:
+        """Leaves out frames that never reached the controller, where then this step and some further ones fit."""
+        received = self._received
+        for lost in range(1, _LOST_MAX + 1):
+            for first in range(place, place + self._steps[index].frames):
+                self._received = received[:first] + received[first + lost :]
+                if self._is_sure(index, place, 2 * _SURE_FRAMES):
+                    self.unheard += lost
+                    return True
+        self._received = received
         return False
 
     def _is_sure(self, index: int, place: int, wanted: int) -> bool:
@@ -177,6 +224,12 @@ class Inputs:
         if after > len(self._received):
             return LogError(f"{where}the log ends before all frames that the controller has taken{cut}")
         lost = self._find_again(index, place)
+        messages, ages = len(_messages(self._received[place:after])), len(step.told.ages)
+        if lost == 0 and messages != ages:
+            return LogError(
+                f"{where}the log lacks CanopyArrivals frames: it has the ages of {ages} messages, and {messages} were "
+                f"taken{cut}"
+            )
         if lost is None:
             return LogError(f"{where}the log has other frames than the controller has taken{cut}")
         if lost > 0:
@@ -203,10 +256,15 @@ class Inputs:
         return None
 
 
+def _messages(frames: Iterable[Taken]) -> list[int]:
+    """Of which messages frames are, in the order of the controller's table: standard ids first."""
+    return sorted({frame.message for frame in frames})
+
+
 def _steps(run: Run, ticks: int) -> Iterator[_Step]:
     taken = check = 0
     for place, tick in enumerate(run.ticks[:ticks]):
-        frames = (tick.taken - taken) % 256
-        if frames or tick.check != check:
-            yield _Step(place, frames, check, tick.check)
+        frames = (tick.taken - taken) % _TAKEN_WRAPS
+        if tick.ages:
+            yield _Step(place, frames or _TAKEN_WRAPS, check, tick)
         taken, check = tick.taken, tick.check

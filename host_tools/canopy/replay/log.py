@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """What a log of a bus says of one controller: its runs, tick by tick, with the frames that came in and went out.
 
-A run begins with the controller's tick 0. CanopyInputs gives the time of each tick and how many frames it has taken;
-the log is complete as long as the sequence numbers of the trace have no gap. All of it is kept in memory.
+A run begins with the controller's tick 0. CanopyInputs gives the time of each tick and how many frames it has taken,
+CanopyArrivals how old they were; the log is complete as long as the sequence numbers of the trace have no gap. All of
+it is kept in memory.
 """
 
 from __future__ import annotations
@@ -18,13 +19,18 @@ from cantools.database.can import Message as DbcMessage
 
 from canopy.files import FileError, check_file
 from canopy.model import Model, ModelError
-from canopy.signals import load_database
+from canopy.replay.ticks import Tick
+from canopy.signals import load_database, message_attribute
 from canopy.trace import mismatch
 from canopy.unixbus import encode
 
 _EXTENDED = 1 << 29
 _LAST_TICK = (1 << 32) - 1
 _NUMBERED = ("CanopyTick", "CanopyChange", "CanopySnapshot")
+NEEDED = ("CanopyTick", "CanopyInputs", "CanopyArrivals")
+"""Trace messages without which nothing can be replayed."""
+AHEAD = 5
+"""A command may be so many ticks ahead of its CanopyTick: a trace frame waits CANOPY_TRACE_PERIODS for the bus, 4."""
 SUFFIXES = (".log", ".asc", ".blf")
 
 
@@ -53,7 +59,9 @@ class Bus:
         """Commands and trace."""
         self.trace: dict[int, str] = {}
         """Which kind a trace message is."""
-        for need in ("CanopyTick", "CanopyInputs"):
+        self.protected: dict[int, int] = {}
+        """The E2E data ids of protected commands."""
+        for need in NEEDED:
             if need not in model.trace:
                 raise ModelError(
                     f"{model.path}: trace: has no {need}, without which nothing can be replayed: add it to the DBC as "
@@ -67,6 +75,9 @@ class Bus:
                 self.sent[number] = message
             elif message.name in model.send:
                 self.sent[number] = message
+                data_id = message_attribute(message, "E2EDataId", -1)
+                if data_id >= 0:
+                    self.protected[number] = data_id
             elif message.name in model.receive:
                 self.received[number] = message
         if len(self.trace) != len(model.trace):
@@ -79,6 +90,8 @@ class Taken:
 
     place: int
     """Number of the frame in the log, from 1."""
+    message: int
+    """Its key."""
     sender: str
     """Who sends the message, by the DBC."""
     datagram: bytes
@@ -93,27 +106,19 @@ class Sent:
 
     place: int
     tick: int
+    """Of a trace frame its tick. Of a command that of the CanopyTick behind it: its own tick, or one up to AHEAD
+    before it, for commands overtake the trace."""
     data: bytes
 
 
-@dataclass
-class Tick:
-    """One tick, as CanopyTick and CanopyInputs tell."""
+@dataclass(frozen=True)
+class Hole:
+    """Trace frames that are missing while the ticks around them are whole."""
 
-    number: int
-    place: int
-    inputs: bytes = b""
-    """Of CanopyInputs; empty: not come yet."""
-
-    @property
-    def taken(self) -> int:
-        """Frames taken since the start, modulo 256."""
-        return self.inputs[6]
-
-    @property
-    def check(self) -> int:
-        """Of all frames taken since the start."""
-        return self.inputs[7]
+    tick: int
+    """Its place in the run."""
+    frames: int
+    text: str
 
 
 @dataclass
@@ -124,10 +129,17 @@ class Run:
     """How many frames that the controller receives are in the log before its tick 0."""
     ticks: list[Tick] = field(default_factory=list)
     sent: dict[int, list[Sent]] = field(default_factory=dict)
+    doubtful: dict[int, int] = field(default_factory=dict)
+    """How many of the first frames of a command may be of a run before."""
+    holes: list[Hole] = field(default_factory=list)
+    """Changes and snapshots that are missing: the controller may have dropped them."""
     gap: str | None = None
     """What is missing in the log behind the last tick; None: nothing."""
     mismatch: str | None = None
     """Why the model is not the controller's."""
+
+    counted: list[tuple[int, int]] = field(default_factory=list)
+    """Tick and TxDropped of each CanopyHealth, also behind a gap."""
 
 
 @dataclass
@@ -142,11 +154,6 @@ class Recording:
     """The log begins with this tick, in the middle of a run; None: no."""
 
 
-def next_check(check: int, fold: int) -> int:
-    """The running check after one more frame: canopy_bus_check() of the runtime."""
-    return ((check << 3) | (check >> 5)) & 0xFF ^ fold
-
-
 class _Reader:
     """Takes the log's frames one by one."""
 
@@ -157,7 +164,7 @@ class _Reader:
         self._sequence = 0
         self._last_tick: int | None = None
         self._commands: list[tuple[int, int, bytes]] = []
-        """Since the last trace frame: key, place, data. They belong to the CanopyTick that comes next."""
+        """Since the last CanopyTick: key, place, data. They are given to the one that comes next."""
 
     def take(self, message: can.Message) -> None:
         """Takes frame number `recording.frames`."""
@@ -178,11 +185,22 @@ class _Reader:
                 self._take_trace(kind, number, place, data)
 
     def end(self) -> Recording:
-        """Leaves out the last tick where the log ends before its CanopyInputs."""
+        """Leaves out the last tick where the log ends before its CanopyInputs and CanopyArrivals."""
         for run in self.recording.runs:
-            if run.ticks and not run.ticks[-1].inputs:
+            if run.ticks and _lacks(run.ticks) is not None:
                 run.ticks.pop()
+            self._end_at_hole(run)
         return self.recording
+
+    def _end_at_hole(self, run: Run) -> None:
+        """A run ends where more trace frames are missing than the controller has counted as dropped."""
+        left = max((dropped for _, dropped in run.counted), default=0)
+        for hole in run.holes:
+            left -= hole.frames
+            if left < 0:
+                run.gap = hole.text
+                del run.ticks[hole.tick :]
+                return
 
     def _take_received(self, message: can.Message, place: int, known: DbcMessage) -> None:
         try:
@@ -191,7 +209,9 @@ class _Reader:
             raise LogError(f"{self.recording.path}: frame {place}: {error}") from error
         fits = not message.is_remote_frame and message.is_fd == known.is_fd and message.dlc == known.length
         fold = reduce(xor, message.data, message.arbitration_id & 0xFF) if fits else None
-        self.recording.received.append(Taken(place, known.senders[0] if known.senders else "", datagram, fold))
+        number = key(message.arbitration_id, message.is_extended_id)
+        sender = known.senders[0] if known.senders else ""
+        self.recording.received.append(Taken(place, number, sender, datagram, fold))
 
     def _take_trace(self, kind: str, number: int, place: int, data: bytes) -> None:
         if kind == "CanopyTick":
@@ -202,48 +222,75 @@ class _Reader:
                 self._begin()
             elif self.recording.joined is None and not self.recording.runs:
                 self.recording.joined = tick
+        if kind == "CanopyHealth" and self.recording.runs:
+            run = self.recording.runs[-1]
+            run.counted.append((len(run.ticks) - 1, int.from_bytes(data[4:6], "little")))
         if self._run is None:
+            self._commands.clear()
             return
-        if kind in _NUMBERED and not self._follows(kind, place, data):
-            return
+        if kind in _NUMBERED:
+            self._follow(kind, place, data)
         if kind == "CanopyTick" and not self._add_tick(place, data):
             return
-        if kind == "CanopyInputs":
-            if self._run.ticks[-1].inputs:
-                self._break(f"before frame {place} a CanopyTick is missing")
-                return
-            self._run.ticks[-1].inputs = data
-        elif kind == "CanopyModel" and self._run.mismatch is None:
+        if kind in ("CanopyInputs", "CanopyArrivals") and not self._complete_tick(kind, place, data):
+            return
+        if kind == "CanopyModel" and self._run.mismatch is None:
             self._run.mismatch = mismatch(self._bus.model, data)
         self._run.sent.setdefault(number, []).append(Sent(place, len(self._run.ticks) - 1, data))
 
     def _begin(self) -> None:
-        """Tick 0. Of each command only the last one is of this tick: before it the run before may have ended."""
-        self._run = Run(before=len(self.recording.received))
-        self.recording.runs.append(self._run)
+        """Tick 0. Of the commands before it all but the last ones may be those with which a run before has ended."""
+        self._run = run = Run(before=len(self.recording.received))
+        self.recording.runs.append(run)
         self._sequence = 0
-        self._commands = list({command[0]: command for command in self._commands}.values())
+        commands: dict[int, list[tuple[int, int, bytes]]] = {}
+        for command in self._commands:
+            commands.setdefault(command[0], []).append(command)
+        run.doubtful = {number: len(frames[-AHEAD:]) - 1 for number, frames in commands.items()}
+        self._commands = sorted(command for frames in commands.values() for command in frames[-AHEAD:])
 
-    def _follows(self, kind: str, place: int, data: bytes) -> bool:
+    def _follow(self, kind: str, place: int, data: bytes) -> None:
+        """Notes what is missing; where a whole tick is, the next CanopyTick or CanopyInputs shows it."""
+        assert self._run is not None
         missing = (data[0] - self._sequence) % 256
         self._sequence = (data[0] + 1) % 256
-        if missing:
-            self._break(f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256")
-        return not missing
+        if missing and self._run.ticks:
+            text = f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256"
+            self._run.holes.append(Hole(len(self._run.ticks) - 1, missing, text))
 
     def _add_tick(self, place: int, data: bytes) -> bool:
         assert self._run is not None
         tick, ticks = int.from_bytes(data[1:5], "little"), self._run.ticks
-        if ticks and not ticks[-1].inputs:
-            self._break(f"before frame {place} CanopyInputs of tick {ticks[-1].number} is missing")
+        lacking = _lacks(ticks) if ticks else None
+        if lacking is not None:
+            self._break(f"before frame {place} {lacking} of tick {ticks[-1].number} is missing")
             return False
         if ticks and tick != ticks[-1].number + 1:
             self._break(f"before frame {place} (tick {tick}) ticks are missing")
             return False
-        ticks.append(Tick(tick, place))
+        ticks.append(Tick(tick, place, ticks[-1].conditions if ticks else 0))
         for number, where, command in self._commands:
             self._run.sent.setdefault(number, []).append(Sent(where, len(ticks) - 1, command))
         self._commands.clear()
+        return True
+
+    def _complete_tick(self, kind: str, place: int, data: bytes) -> bool:
+        """Adds what CanopyInputs or CanopyArrivals says to the current tick."""
+        assert self._run is not None
+        tick = self._run.ticks[-1]
+        if kind == "CanopyInputs":
+            if tick.inputs:
+                self._break(f"before frame {place} a CanopyTick is missing")
+                return False
+            tick.inputs = data
+        elif not tick.inputs:
+            self._break(f"before frame {place} CanopyInputs of tick {tick.number} is missing")
+            return False
+        elif data[7] != tick.number & 0xFF:
+            self._break(f"before frame {place} (CanopyArrivals of another tick than {tick.number}) frames are missing")
+            return False
+        else:
+            tick.take_arrivals(data)
         return True
 
     def _break(self, gap: str) -> None:
@@ -252,6 +299,13 @@ class _Reader:
             self._run.gap = gap
             self._run.ticks.pop()
             self._run = None
+
+
+def _lacks(ticks: list[Tick]) -> str | None:
+    """Which message the last tick lacks; None: none, as far as can be told without the frames that it took."""
+    if not ticks[-1].inputs:
+        return "CanopyInputs"
+    return "CanopyArrivals" if ticks[-1].lacks_arrivals(ticks[-2] if len(ticks) > 1 else None) else None
 
 
 def read_recording(path: Path, model: Model, channel: str | None = None) -> Recording:

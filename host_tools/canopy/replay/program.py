@@ -6,11 +6,13 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import can
 
 from canopy.replay.inputs import Inputs
 from canopy.replay.log import Bus, Run
+from canopy.replay.ticks import Tick
 from canopy.unixbus import HEADER, REMOTE, decode, encode
 
 
@@ -19,20 +21,35 @@ class ProgramError(Exception):
 
 
 def write_record(path: Path, bus: Bus, run: Run, inputs: Inputs) -> None:
-    """Writes for each tick CanopyInputs, and then the frames that it took.
+    """Writes for each tick CanopyInputs, the state of the bus, and the frames that it took, each behind its age.
+
+    The form is that of canopy/clock/replay.h.
 
     Raises:
         OSError: The file cannot be written.
     """
-    message = next(bus.sent[number] for number, kind in bus.trace.items() if kind == "CanopyInputs")
+    begin, arrivals = (_message(bus, kind) for kind in ("CanopyInputs", "CanopyArrivals"))
+    conditions = 0
     with path.open("wb") as file:
-        for tick, frames in zip(run.ticks, inputs, strict=False):
-            begin = can.Message(
-                arbitration_id=message.frame_id, is_extended_id=message.is_extended_frame, data=tick.inputs
-            )
-            file.write(encode(begin))
+        for tick, frames, ages in zip(run.ticks, inputs, inputs.ages, strict=False):
+            file.write(encode(can.Message(**begin, data=tick.inputs)))
             for frame in frames:
+                file.write(encode(can.Message(**arrivals, data=_arrival(tick, ages[frame.message]))))
                 file.write(frame.datagram)
+            if not frames and tick.conditions != conditions:
+                file.write(encode(can.Message(**arrivals, data=_arrival(tick, None))))
+            conditions = tick.conditions
+
+
+def _message(bus: Bus, kind: str) -> dict[str, Any]:
+    message = next(bus.sent[number] for number, name in bus.trace.items() if name == kind)
+    return {"arbitration_id": message.frame_id, "is_extended_id": message.is_extended_frame}
+
+
+def _arrival(tick: Tick, age: int | None) -> bytes:
+    """CanopyArrivals with the age of the next frame; None: only with the state of the bus."""
+    count = 0 if age is None else 1
+    return bytes([tick.conditions | count << 4, *(age or 0).to_bytes(2, "little"), 0, 0, 0, 0, tick.number & 0xFF])
 
 
 def run_program(program: Path, arguments: tuple[str, ...], record: Path, sent: Path) -> None:

@@ -15,11 +15,14 @@
 #include <stdint.h>
 
 #include "canopy/can.h"
+#include "canopy/can_state.h"
 #include "canopy/clock.h"
+#include "canopy/count.h"
 #include "canopy/e2e.h"
+#include "canopy/tx.h"
 
-/** In data_id: the message has no end-to-end protection. */
-#define CANOPY_E2E_NONE (-1)
+/** The age of a message that never came, and of one that is older than all others [ms]. */
+#define CANOPY_AGE_MAX UINT16_MAX
 
 /** A message that the controller receives. Constant. */
 typedef struct {
@@ -33,42 +36,45 @@ typedef struct {
      * @return false when one lies outside the DBC's range: then nothing was taken.
      */
     bool (*decode)(void *input, const uint8_t *data);
-    /** Tells the leaves (through the input image) whether the message is fresh. */
-    void (*set_fresh)(void *input, bool fresh);
+    /**
+     * Tells the leaves (through the input image) whether the message is fresh, and how old its values are.
+     * @param age_ms since they were on the wire, rounded up [ms]; CANOPY_AGE_MAX: none are there, or they are older
+     */
+    void (*set_age)(void *input, bool fresh, uint16_t age_ms);
 } canopy_rx_message_t;
 
-/** A message that the controller sends. Constant. */
+/** What is true of a whole cycle: a part of the input image. */
 typedef struct {
-    uint32_t id;
-    uint8_t flags;
-    uint8_t length;
-    int32_t data_id; /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
-    uint16_t every;  /**< Sent in every `every`-th tick, >= 1. */
-    /** Writes the output image's values into `length` bytes, all of them. */
-    void (*encode)(const void *output, uint8_t *data);
-} canopy_tx_message_t;
+    canopy_time_t now;            /**< Time of this tick [us]. */
+    canopy_can_state_t can_state; /**< The state of the bus. */
+    /** More has come than is taken, for more than one cycle, or the driver has lost frames: what is here may not be all. */
+    bool overload;
+} canopy_cycle_t;
 
 /** The bus of one application. Constant. */
 typedef struct {
     const canopy_rx_message_t *rx; /**< In ascending order of (extended, id). */
-    const canopy_tx_message_t *tx; /**< In the order in which they are sent. */
+    const canopy_tx_message_t *tx; /**< In the order of their urgency: the lowest arbitration id first. */
     uint16_t rx_count;
     uint16_t tx_count;
     /** Gives every output its safe value: what is sent when no leaf writes it. */
     void (*reset_output)(void *output);
-    /** Hands `now` to the leaves through the input image. */
-    void (*set_now)(void *input, canopy_time_t now);
+    /** Hands to the leaves, through the input image, what is true of the whole cycle. */
+    void (*set_cycle)(void *input, const canopy_cycle_t *cycle);
 } canopy_bus_t;
 
 /** State of a received message. */
 typedef struct {
-    canopy_time_t received_at; /**< Of the last accepted frame. */
+    canopy_time_t arrived_at; /**< On the wire, of the last accepted frame; a whole number of ms before it was taken. */
     canopy_e2e_receiver_t e2e;
-    bool received; /**< Has a frame ever been accepted? */
-    bool fresh;
+    bool received;   /**< Has a frame ever been accepted, and is it not stale? */
+    bool fresh;      /**< As the leaves saw it in the last tick. */
+    bool taken;      /**< A frame was taken since the last tick, accepted or not. */
+    bool taken_then; /**< The same of the tick before: what the trace tells. */
+    uint16_t age_ms; /**< When it was taken, of the frame accepted last [ms]; CANOPY_AGE_MAX and more are one. */
 } canopy_rx_state_t;
 
-/** What became of frames. Counters only grow, and saturate. */
+/** What became of received frames. Counters only grow, and saturate. */
 typedef struct {
     uint32_t accepted;
     uint32_t unknown_id;     /**< Not a message of this controller. */
@@ -77,8 +83,6 @@ typedef struct {
     uint32_t wrong_sequence; /**< E2E: repeated, or out of order. */
     uint32_t out_of_range;   /**< A value outside the DBC's range. */
     uint32_t timeouts;       /**< A message became stale. */
-    uint32_t sent;
-    uint32_t tx_dropped; /**< The driver had no room or failed; the frame is not tried again. */
 } canopy_bus_counters_t;
 
 /** An application's bus at run time: the tables, the images, and the state. Set up by
@@ -88,24 +92,11 @@ typedef struct {
     void *input;
     void *output;
     canopy_rx_state_t *rx; /**< bus->rx_count. */
-    uint8_t *tx_counters;  /**< bus->tx_count E2E counters. */
     canopy_bus_counters_t counters;
     /** What CanopyInputs tells of the frames taken since the start, so that a replay can take the same ones: */
     uint8_t taken; /**< How many had the id of a message, refused ones too; modulo 256. */
-    uint8_t check; /**< canopy_bus_check() over those of a right form. */
+    uint8_t check; /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
 } canopy_bus_state_t;
-
-/** The sum, or the largest value where that is less. O(1); may be called from anywhere. */
-static inline uint32_t canopy_sum(uint32_t a, uint32_t b)
-{
-    return a <= UINT32_MAX - b ? a + b : UINT32_MAX;
-}
-
-/** Adds one, and stays at the largest value instead of starting again at 0. O(1). */
-static inline void canopy_count(uint32_t *counter)
-{
-    *counter += *counter != UINT32_MAX ? 1u : 0u;
-}
 
 /**
  * The running check of CanopyInputs after one more frame: the one before, rotated left by 3, XOR the low byte of the id,
@@ -116,18 +107,18 @@ uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_
 
 /**
  * Takes one frame into the input image, or refuses and counts it. O(log messages + bytes).
- * @param now when it was taken from the driver [us]
+ * @param now the time of the cycle that takes it [us]; a frame that has arrived since has the age 0
  */
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now);
 
-/** Before a tick: tells the leaves what is fresh and what time it is; outputs take their safe values. O(messages). */
-void canopy_bus_begin_tick(canopy_bus_state_t *self, canopy_time_t now);
+/** Before a tick: tells the leaves what is fresh, and of the cycle; outputs take their safe values. O(messages). */
+void canopy_bus_begin_tick(canopy_bus_state_t *self, const canopy_cycle_t *cycle);
 
-/**
- * After a tick: sends the messages that are due in tick number `tick`. O(messages).
- * A frame that the driver does not take is dropped and counted: a command must not leave late.
- */
-void canopy_bus_commit(canopy_bus_state_t *self, const canopy_can_t *can, uint32_t tick);
+/** After a tick: posts the messages that are due in tick number `tick`, each with its deadline. O(messages). */
+void canopy_bus_commit(const canopy_bus_state_t *self, canopy_tx_t *tx, uint32_t tick, canopy_time_t now);
+
+/** Posts every message, due or not, with one deadline. O(messages). */
+void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until);
 
 /** Frames refused for any reason but an unknown id; saturates. O(1). */
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters);

@@ -149,12 +149,14 @@ canopy_image_error_t canopy_image_load(const canopy_image_app_t *self, const uin
                                        uint16_t *where);
 
 /**
- * Stops the tree that runs as canopy_loop_stop() does (halt handlers are called, every command is sent once), and lets
- * the loaded image begin with the next cycle: every entry has its first value, every leaf's state is 0. Counters go on.
+ * Stops the tree that runs as canopy_loop_stop() does (halt handlers are called, safe values go out; it may wait for the
+ * bus), and lets the loaded image begin with the next cycle: every entry has its first value, every leaf's state is 0.
+ * Counters go on.
  *
  * @param now [us], as for canopy_loop_cycle()
- * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT when it is another application's loop, CANOPY_ERROR_NOT_FOUND when no image
- *         is loaded: then nothing is changed. O(nodes + messages).
+ * @return CANOPY_OK. CANOPY_ERROR_BUS_DOWN: the image runs, but the safe values in between are not known to be out.
+ *         CANOPY_ERROR_ARGUMENT when it is another application's loop, CANOPY_ERROR_NOT_FOUND when no image is loaded:
+ *         then nothing is changed. O(nodes + messages).
  */
 canopy_error_t canopy_image_run(const canopy_image_app_t *self, canopy_loop_t *loop, canopy_time_t now);
 

@@ -46,6 +46,7 @@ void canopy_fuzz_injected(void)
 /** The bus: as many frames as are left in this tick, most of them with an id and a form that the application knows. */
 typedef struct {
     const canopy_app_t *app;
+    canopy_time_t time;
     unsigned left;
     uint8_t counter;
 } bus_t;
@@ -60,6 +61,7 @@ static int receive(void *context, canopy_can_frame_t *frame)
     }
     bus->left--;
     memset(frame, 0, sizeof *frame);
+    frame->time = bus->time - fuzz_next() % 2000000u; /* up to 2 s ago, or longer than there is time */
     for (unsigned place = 0; place < sizeof frame->data; place++) {
         frame->data[place] = (fuzz_next() & 3u) != 0u ? 0u : (uint8_t)fuzz_next();
     }
@@ -79,9 +81,10 @@ static int receive(void *context, canopy_can_frame_t *frame)
     return 1;
 }
 
-static int send_frame(void *context, const canopy_can_frame_t *frame)
+static int send_frame(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
     (void)context;
+    (void)mailbox;
     fuzz_read(frame->data, frame->length);
     return (fuzz_next() & 15u) != 0u;
 }
@@ -133,8 +136,9 @@ void fuzz_run(const canopy_app_t *app, uint64_t seed)
     }
     for (unsigned tick = 0; tick < TICKS; tick++) {
         bus.left = (unsigned)(fuzz_next() % (FRAMES_A_TICK + 1u));
+        bus.time = time;
         (void)canopy_loop_cycle(&loop, time);
         time += app->period;
     }
-    canopy_loop_stop(&loop, time);
+    (void)canopy_loop_stop(&loop, time);
 }

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x94acdef012d9b010u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x8d8b2c7dddd69ce1u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x94acdef012d9b010u
+#if CANOPY_GENERATED_COOLER_APP_H != 0x8d8b2c7dddd69ce1u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x94acdef012d9b010u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x8d8b2c7dddd69ce1u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -30,6 +30,9 @@ typedef struct {
     canopy_tree_instance_t tree;
     canopy_bus_state_t bus;
     canopy_trace_state_t trace;
+    canopy_tx_t tx;
+    canopy_tx_slot_t tx_slots[COOLER_TX_MESSAGES];
+    canopy_tx_trace_t tx_trace[1];
     cooler_input_t input;
     cooler_output_t output;
     cooler_entries_t entries;
@@ -37,7 +40,7 @@ typedef struct {
     uint16_t words[COOLER_WORDS];
     uint8_t status[COOLER_NODES];
     uint8_t sent[COOLER_NODES];
-    uint8_t tx_counters[COOLER_TX_MESSAGES];
+    uint8_t tx_data[COOLER_TX_BYTES];
     beep_state_t beep[1];
 } cooler_memory_t;
 
@@ -235,6 +238,7 @@ extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Contr
 const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_cooler_dbc = {
     .tick = {.id = CANOPY_TRACE_OFF},
     .inputs = {.id = CANOPY_TRACE_OFF},
+    .arrivals = {.id = CANOPY_TRACE_OFF},
     .change = {.id = CANOPY_TRACE_OFF},
     .snapshot = {.id = CANOPY_TRACE_OFF},
     .health = {.id = CANOPY_TRACE_OFF},
@@ -264,6 +268,9 @@ const canopy_app_t cooler_app = {
     .tree = &tree,
     .bus = &cooler_bus,
     .trace = &canopy_only_one_application_may_be_node_Controller_of_cooler_dbc,
+    .acceptance = &cooler_acceptance,
+    .rx_max = 1064u,
+    .frame_us = 320u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
@@ -273,7 +280,11 @@ const canopy_app_t cooler_app = {
     .input = &memory.input,
     .output = &memory.output,
     .rx = memory.rx,
-    .tx_counters = memory.tx_counters,
+    .tx = &memory.tx,
+    .tx_memory = {.slots = memory.tx_slots,
+                  .data = memory.tx_data,
+                  .trace = memory.tx_trace,
+                  .trace_capacity = 1u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

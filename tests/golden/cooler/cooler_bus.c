@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x94acdef012d9b010u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x8d8b2c7dddd69ce1u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -32,9 +32,12 @@ static bool decode_climate(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_climate_fresh(void *input, bool fresh)
+static void set_climate_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((cooler_input_t *)input)->climate.fresh = fresh;
+    cooler_input_t *in = input;
+
+    in->climate.fresh = fresh;
+    in->climate.age_ms = age_ms;
 }
 
 /* The signals' bits in canopy/bus.h's words of what was written. */
@@ -93,9 +96,13 @@ static void reset_output(void *output)
     out->compressor.mode = 0;
 }
 
-static void set_now(void *input, canopy_time_t now)
+static void set_cycle(void *input, const canopy_cycle_t *cycle)
 {
-    ((cooler_input_t *)input)->now = now;
+    cooler_input_t *in = input;
+
+    in->now = cycle->now;
+    in->can_state = cycle->can_state;
+    in->overload = cycle->overload;
 }
 
 static const canopy_rx_message_t rx[] = {
@@ -105,7 +112,7 @@ static const canopy_rx_message_t rx[] = {
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_climate,
-     .set_fresh = set_climate_fresh},
+     .set_age = set_climate_age},
 };
 
 static const canopy_tx_message_t tx[] = {
@@ -114,7 +121,18 @@ static const canopy_tx_message_t tx[] = {
      .length = COOLER_COMPRESSOR_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .every = 1u, /* 100 ms */
+     .place = 0u,
+     .deadline = 100000u,
      .encode = encode_compressor},
+};
+
+static const uint32_t accepted_ids[] = {
+    COOLER_CLIMATE_ID,
+};
+
+const canopy_can_acceptance_t cooler_acceptance = {
+    .ids = accepted_ids,
+    .count = COOLER_RX_MESSAGES,
 };
 
 const canopy_bus_t cooler_bus = {
@@ -123,5 +141,5 @@ const canopy_bus_t cooler_bus = {
     .rx_count = COOLER_RX_MESSAGES,
     .tx_count = COOLER_TX_MESSAGES,
     .reset_output = reset_output,
-    .set_now = set_now,
+    .set_cycle = set_cycle,
 };

@@ -5,17 +5,19 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COOLER_BUS_H
-#define CANOPY_GENERATED_COOLER_BUS_H 0x94acdef012d9b010u /* of this run */
+#define CANOPY_GENERATED_COOLER_BUS_H 0x8d8b2c7dddd69ce1u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "canopy/acceptance.h"
 #include "canopy/bus.h"
 #include "canopy/signal.h"
 
 #define COOLER_RX_MESSAGES 1u
 #define COOLER_TX_MESSAGES 1u
 #define COOLER_OUTPUT_SIGNALS 2u
+#define COOLER_TX_BYTES 4u
 
 /* Climate: What the box feels. */
 #define COOLER_CLIMATE_ID 0x100u
@@ -46,10 +48,13 @@ typedef enum {
 } cooler_compressor_mode_t;
 
 /**
- * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed.
+ * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they
+ * were on the wire, `age_ms` how long ago that was, rounded up (CANOPY_AGE_MAX: not fresh).
  */
 typedef struct {
-    canopy_time_t now; /**< Time of this tick [us]. */
+    canopy_time_t now;            /**< Time of this tick [us]. */
+    canopy_can_state_t can_state; /**< The state of the bus. */
+    bool overload;                /**< Frames may be missing: more comes than is taken, or the driver has lost some. */
     /** What the box feels. */
     struct {
         int16_t temperature; /**< 0.1 degC */
@@ -58,6 +63,7 @@ typedef struct {
          * 0.1 V. Below 11 V the compressor would empty the battery of the car; the box then stops it by itself, too.
          */
         uint8_t supply;
+        uint16_t age_ms;
         bool fresh;
     } climate;
 } cooler_input_t;
@@ -77,6 +83,9 @@ typedef struct {
 void cooler_set_compressor_power(cooler_output_t *out, int32_t value);
 /** Writes Compressor.Mode. A value that is none of the enum's becomes the safe one, and is counted. */
 void cooler_set_compressor_mode(cooler_output_t *out, cooler_compressor_mode_t value);
+
+/** The ids that the application receives, for the driver's acceptance filter. */
+extern const canopy_can_acceptance_t cooler_acceptance;
 
 /** The bus's tables, for the loop. */
 extern const canopy_bus_t cooler_bus;

@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x5ba958d802c818c3u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x87a0bfd999cb3584u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x5ba958d802c818c3u
+#if CANOPY_GENERATED_COURIER_APP_H != 0x87a0bfd999cb3584u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x5ba958d802c818c3u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x87a0bfd999cb3584u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -40,6 +40,9 @@ typedef struct {
     canopy_tree_instance_t tree;
     canopy_bus_state_t bus;
     canopy_trace_state_t trace;
+    canopy_tx_t tx;
+    canopy_tx_slot_t tx_slots[COURIER_TX_MESSAGES];
+    canopy_tx_trace_t tx_trace[16];
     courier_input_t input;
     courier_output_t output;
     courier_entries_t entries;
@@ -47,7 +50,7 @@ typedef struct {
     uint16_t words[COURIER_WORDS];
     uint8_t status[COURIER_NODES];
     uint8_t sent[COURIER_NODES];
-    uint8_t tx_counters[COURIER_TX_MESSAGES];
+    uint8_t tx_data[COURIER_TX_BYTES];
     request_t compute_path[1];
     request_t clear_map[2];
     follow_t follow_path[1];
@@ -512,6 +515,7 @@ extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Contr
 const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc = {
     .tick = {.id = COURIER_CANOPY_TICK_ID},
     .inputs = {.id = CANOPY_TRACE_OFF},
+    .arrivals = {.id = CANOPY_TRACE_OFF},
     .change = {.id = COURIER_CANOPY_CHANGE_ID},
     .snapshot = {.id = COURIER_CANOPY_SNAPSHOT_ID},
     .health = {.id = COURIER_CANOPY_HEALTH_ID},
@@ -543,6 +547,9 @@ const canopy_app_t courier_app = {
     .tree = &tree,
     .bus = &courier_bus,
     .trace = &canopy_only_one_application_may_be_node_Controller_of_courier_dbc,
+    .acceptance = &courier_acceptance,
+    .rx_max = 532u,
+    .frame_us = 320u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
@@ -552,7 +559,11 @@ const canopy_app_t courier_app = {
     .input = &memory.input,
     .output = &memory.output,
     .rx = memory.rx,
-    .tx_counters = memory.tx_counters,
+    .tx = &memory.tx,
+    .tx_memory = {.slots = memory.tx_slots,
+                  .data = memory.tx_data,
+                  .trace = memory.tx_trace,
+                  .trace_capacity = 16u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

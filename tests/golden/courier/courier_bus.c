@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x5ba958d802c818c3u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x87a0bfd999cb3584u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -27,9 +27,12 @@ static bool decode_pose(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_pose_fresh(void *input, bool fresh)
+static void set_pose_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((courier_input_t *)input)->pose.fresh = fresh;
+    courier_input_t *in = input;
+
+    in->pose.fresh = fresh;
+    in->pose.age_ms = age_ms;
 }
 
 /* Order, 0x110, 5 bytes */
@@ -53,9 +56,12 @@ static bool decode_order(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_order_fresh(void *input, bool fresh)
+static void set_order_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((courier_input_t *)input)->order.fresh = fresh;
+    courier_input_t *in = input;
+
+    in->order.fresh = fresh;
+    in->order.age_ms = age_ms;
 }
 
 /* PlanReply, 0x120, 6 bytes */
@@ -84,9 +90,12 @@ static bool decode_plan_reply(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_plan_reply_fresh(void *input, bool fresh)
+static void set_plan_reply_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((courier_input_t *)input)->plan_reply.fresh = fresh;
+    courier_input_t *in = input;
+
+    in->plan_reply.fresh = fresh;
+    in->plan_reply.age_ms = age_ms;
 }
 
 /* MapStatus, 0x130, 1 bytes */
@@ -100,9 +109,12 @@ static bool decode_map_status(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_map_status_fresh(void *input, bool fresh)
+static void set_map_status_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((courier_input_t *)input)->map_status.fresh = fresh;
+    courier_input_t *in = input;
+
+    in->map_status.fresh = fresh;
+    in->map_status.age_ms = age_ms;
 }
 
 /* The signals' bits in canopy/bus.h's words of what was written. */
@@ -271,9 +283,13 @@ static void reset_output(void *output)
     out->drive.speed_y = 0;
 }
 
-static void set_now(void *input, canopy_time_t now)
+static void set_cycle(void *input, const canopy_cycle_t *cycle)
 {
-    ((courier_input_t *)input)->now = now;
+    courier_input_t *in = input;
+
+    in->now = cycle->now;
+    in->can_state = cycle->can_state;
+    in->overload = cycle->overload;
 }
 
 static const canopy_rx_message_t rx[] = {
@@ -283,28 +299,28 @@ static const canopy_rx_message_t rx[] = {
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_pose,
-     .set_fresh = set_pose_fresh},
+     .set_age = set_pose_age},
     {.id = COURIER_ORDER_ID,
      .flags = 0,
      .length = COURIER_ORDER_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_order,
-     .set_fresh = set_order_fresh},
+     .set_age = set_order_age},
     {.id = COURIER_PLAN_REPLY_ID,
      .flags = 0,
      .length = COURIER_PLAN_REPLY_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_plan_reply,
-     .set_fresh = set_plan_reply_fresh},
+     .set_age = set_plan_reply_age},
     {.id = COURIER_MAP_STATUS_ID,
      .flags = 0,
      .length = COURIER_MAP_STATUS_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_map_status,
-     .set_fresh = set_map_status_fresh},
+     .set_age = set_map_status_age},
 };
 
 static const canopy_tx_message_t tx[] = {
@@ -313,19 +329,37 @@ static const canopy_tx_message_t tx[] = {
      .length = COURIER_PLAN_REQUEST_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .every = 1u, /* 50 ms */
+     .place = 0u,
+     .deadline = 50000u,
      .encode = encode_plan_request},
     {.id = COURIER_MAP_COMMAND_ID,
      .flags = 0,
      .length = COURIER_MAP_COMMAND_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .every = 1u, /* 50 ms */
+     .place = 10u,
+     .deadline = 50000u,
      .encode = encode_map_command},
     {.id = COURIER_DRIVE_ID,
      .flags = 0,
      .length = COURIER_DRIVE_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .every = 1u, /* 50 ms */
+     .place = 14u,
+     .deadline = 50000u,
      .encode = encode_drive},
+};
+
+static const uint32_t accepted_ids[] = {
+    COURIER_POSE_ID,
+    COURIER_ORDER_ID,
+    COURIER_PLAN_REPLY_ID,
+    COURIER_MAP_STATUS_ID,
+};
+
+const canopy_can_acceptance_t courier_acceptance = {
+    .ids = accepted_ids,
+    .count = COURIER_RX_MESSAGES,
 };
 
 const canopy_bus_t courier_bus = {
@@ -334,5 +368,5 @@ const canopy_bus_t courier_bus = {
     .rx_count = COURIER_RX_MESSAGES,
     .tx_count = COURIER_TX_MESSAGES,
     .reset_output = reset_output,
-    .set_now = set_now,
+    .set_cycle = set_cycle,
 };

@@ -5,17 +5,19 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0x5ba958d802c818c3u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0x87a0bfd999cb3584u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "canopy/acceptance.h"
 #include "canopy/bus.h"
 #include "canopy/signal.h"
 
 #define COURIER_RX_MESSAGES 4u
 #define COURIER_TX_MESSAGES 3u
 #define COURIER_OUTPUT_SIGNALS 7u
+#define COURIER_TX_BYTES 22u
 
 /* Pose: Where the robot is. It has mecanum wheels, so it can drive in every direction. */
 #define COURIER_POSE_ID 0x100u
@@ -95,14 +97,18 @@ typedef enum {
 #define COURIER_CANOPY_HEALTH_ID 0x603u
 
 /**
- * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed.
+ * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they
+ * were on the wire, `age_ms` how long ago that was, rounded up (CANOPY_AGE_MAX: not fresh).
  */
 typedef struct {
-    canopy_time_t now; /**< Time of this tick [us]. */
+    canopy_time_t now;            /**< Time of this tick [us]. */
+    canopy_can_state_t can_state; /**< The state of the bus. */
+    bool overload;                /**< Frames may be missing: more comes than is taken, or the driver has lost some. */
     /** Where the robot is. It has mecanum wheels, so it can drive in every direction. */
     struct {
         int16_t x; /**< 1 mm */
         int16_t y; /**< 1 mm */
+        uint16_t age_ms;
         bool fresh;
     } pose;
     /** Where the operator wants the robot. A new order has a new number; 0 is no order. */
@@ -110,6 +116,7 @@ typedef struct {
         uint8_t number;
         int16_t x; /**< 1 mm */
         int16_t y; /**< 1 mm */
+        uint16_t age_ms;
         bool fresh;
     } order;
     /** The planner's answer to the request of the same number: one point on the way, then the goal. */
@@ -118,11 +125,13 @@ typedef struct {
         uint8_t result;
         int16_t via_x; /**< 1 mm */
         int16_t via_y; /**< 1 mm */
+        uint16_t age_ms;
         bool fresh;
     } plan_reply;
     /** The last request to clear the map that has been obeyed. */
     struct {
         uint8_t clear_number;
+        uint16_t age_ms;
         bool fresh;
     } map_status;
 } courier_input_t;
@@ -163,6 +172,9 @@ void courier_set_map_command_layer(courier_output_t *out, courier_map_command_la
 void courier_set_drive_speed_x(courier_output_t *out, int32_t value);
 /** Writes Drive.SpeedY, raw, -1000..1000. A value outside is limited, and counted. */
 void courier_set_drive_speed_y(courier_output_t *out, int32_t value);
+
+/** The ids that the application receives, for the driver's acceptance filter. */
+extern const canopy_can_acceptance_t courier_acceptance;
 
 /** The bus's tables, for the loop. */
 extern const canopy_bus_t courier_bus;

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xce9219fda46b15fau
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xda6f4f2486deff35u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xce9219fda46b15fau
+#if CANOPY_GENERATED_ROOM_APP_H != 0xda6f4f2486deff35u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xce9219fda46b15fau
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xda6f4f2486deff35u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -28,13 +28,16 @@ typedef struct {
     canopy_tree_instance_t tree;
     canopy_bus_state_t bus;
     canopy_trace_state_t trace;
+    canopy_tx_t tx;
+    canopy_tx_slot_t tx_slots[ROOM_TX_MESSAGES];
+    canopy_tx_trace_t tx_trace[1];
     room_input_t input;
     room_output_t output;
     canopy_rx_state_t rx[ROOM_RX_MESSAGES];
     uint16_t words[1];
     uint8_t status[ROOM_NODES];
     uint8_t sent[ROOM_NODES];
-    uint8_t tx_counters[ROOM_TX_MESSAGES];
+    uint8_t tx_data[ROOM_TX_BYTES];
 } room_memory_t;
 
 static room_memory_t memory;
@@ -103,6 +106,7 @@ extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Contr
 const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_room_dbc = {
     .tick = {.id = CANOPY_TRACE_OFF},
     .inputs = {.id = CANOPY_TRACE_OFF},
+    .arrivals = {.id = CANOPY_TRACE_OFF},
     .change = {.id = CANOPY_TRACE_OFF},
     .snapshot = {.id = CANOPY_TRACE_OFF},
     .health = {.id = CANOPY_TRACE_OFF},
@@ -118,6 +122,9 @@ const canopy_app_t room_app = {
     .tree = &tree,
     .bus = &room_bus,
     .trace = &canopy_only_one_application_may_be_node_Controller_of_room_dbc,
+    .acceptance = &room_acceptance,
+    .rx_max = 1064u,
+    .frame_us = 320u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = memory.status,
@@ -126,7 +133,11 @@ const canopy_app_t room_app = {
     .input = &memory.input,
     .output = &memory.output,
     .rx = memory.rx,
-    .tx_counters = memory.tx_counters,
+    .tx = &memory.tx,
+    .tx_memory = {.slots = memory.tx_slots,
+                  .data = memory.tx_data,
+                  .trace = memory.tx_trace,
+                  .trace_capacity = 1u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

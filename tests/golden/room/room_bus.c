@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xce9219fda46b15fau
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xda6f4f2486deff35u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -22,9 +22,12 @@ static bool decode_climate(void *input, const uint8_t *data)
     return true;
 }
 
-static void set_climate_fresh(void *input, bool fresh)
+static void set_climate_age(void *input, bool fresh, uint16_t age_ms)
 {
-    ((room_input_t *)input)->climate.fresh = fresh;
+    room_input_t *in = input;
+
+    in->climate.fresh = fresh;
+    in->climate.age_ms = age_ms;
 }
 
 /* The signals' bits in canopy/bus.h's words of what was written. */
@@ -65,9 +68,13 @@ static void reset_output(void *output)
     out->fan_command.speed = 0;
 }
 
-static void set_now(void *input, canopy_time_t now)
+static void set_cycle(void *input, const canopy_cycle_t *cycle)
 {
-    ((room_input_t *)input)->now = now;
+    room_input_t *in = input;
+
+    in->now = cycle->now;
+    in->can_state = cycle->can_state;
+    in->overload = cycle->overload;
 }
 
 static const canopy_rx_message_t rx[] = {
@@ -77,7 +84,7 @@ static const canopy_rx_message_t rx[] = {
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_climate,
-     .set_fresh = set_climate_fresh},
+     .set_age = set_climate_age},
 };
 
 static const canopy_tx_message_t tx[] = {
@@ -86,7 +93,18 @@ static const canopy_tx_message_t tx[] = {
      .length = ROOM_FAN_COMMAND_LENGTH,
      .data_id = CANOPY_E2E_NONE,
      .every = 1u, /* 100 ms */
+     .place = 0u,
+     .deadline = 100000u,
      .encode = encode_fan_command},
+};
+
+static const uint32_t accepted_ids[] = {
+    ROOM_CLIMATE_ID,
+};
+
+const canopy_can_acceptance_t room_acceptance = {
+    .ids = accepted_ids,
+    .count = ROOM_RX_MESSAGES,
 };
 
 const canopy_bus_t room_bus = {
@@ -95,5 +113,5 @@ const canopy_bus_t room_bus = {
     .rx_count = ROOM_RX_MESSAGES,
     .tx_count = ROOM_TX_MESSAGES,
     .reset_output = reset_output,
-    .set_now = set_now,
+    .set_cycle = set_cycle,
 };

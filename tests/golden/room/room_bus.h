@@ -5,17 +5,19 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H 0xce9219fda46b15fau /* of this run */
+#define CANOPY_GENERATED_ROOM_BUS_H 0xda6f4f2486deff35u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "canopy/acceptance.h"
 #include "canopy/bus.h"
 #include "canopy/signal.h"
 
 #define ROOM_RX_MESSAGES 1u
 #define ROOM_TX_MESSAGES 1u
 #define ROOM_OUTPUT_SIGNALS 1u
+#define ROOM_TX_BYTES 2u
 
 /* Climate */
 #define ROOM_CLIMATE_ID 0x100u
@@ -30,12 +32,16 @@
 #define ROOM_FAN_COMMAND_SPEED(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
 
 /**
- * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed.
+ * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they
+ * were on the wire, `age_ms` how long ago that was, rounded up (CANOPY_AGE_MAX: not fresh).
  */
 typedef struct {
-    canopy_time_t now; /**< Time of this tick [us]. */
+    canopy_time_t now;            /**< Time of this tick [us]. */
+    canopy_can_state_t can_state; /**< The state of the bus. */
+    bool overload;                /**< Frames may be missing: more comes than is taken, or the driver has lost some. */
     struct {
         int16_t temperature; /**< 0.1 degC */
+        uint16_t age_ms;
         bool fresh;
     } climate;
 } room_input_t;
@@ -52,6 +58,9 @@ typedef struct {
 
 /** Writes FanCommand.Speed, raw, 0..100. A value outside is limited, and counted. */
 void room_set_fan_command_speed(room_output_t *out, int32_t value);
+
+/** The ids that the application receives, for the driver's acceptance filter. */
+extern const canopy_can_acceptance_t room_acceptance;
 
 /** The bus's tables, for the loop. */
 extern const canopy_bus_t room_bus;

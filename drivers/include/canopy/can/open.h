@@ -14,8 +14,8 @@
 
 #include <stddef.h>
 
+#include "canopy/acceptance.h"
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
 #include "canopy/can/socketcan.h"
 #include "canopy/can/unixbus.h"
 #include "canopy/status.h"
@@ -38,13 +38,22 @@ typedef struct {
  *
  * @param port          the object
  * @param spec          "driver:bus", as above
- * @param acceptance    filter, which lives as long as the port is open; NULL: every data and remote frame
+ * @param acceptance    filter, which lives as long as the port is open: the application's `acceptance`,
+ *                      CANOPY_CAN_ACCEPT_EVERYTHING, or a list of your own; NULL is an error
  * @param message       on failure receives one line: what is wrong and the way out
  * @param message_size  its size [bytes]; a longer message is shortened
  * @return CANOPY_OK; else the driver's error, or CANOPY_ERROR_ARGUMENT for a spec of no known form.
  */
 canopy_error_t canopy_can_open(canopy_can_port_t *port, const char *spec, const canopy_can_acceptance_t *acceptance,
                                char *message, size_t message_size);
+
+/**
+ * What the user should know about the open bus now: what this driver cannot promise on it, and what to do. A program prints
+ * it when it starts. O(1).
+ * @param number 0 for the first text, 1 for the second ...
+ * @return one line; NULL: no more
+ */
+const char *canopy_can_advice(const canopy_can_port_t *port, unsigned number);
 
 /** Closes; nothing happens when it is closed already. Afterwards `can` is NULL: nothing may use the driver any more. */
 void canopy_can_close(canopy_can_port_t *port);

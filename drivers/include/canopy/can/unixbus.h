@@ -12,6 +12,14 @@
  * but were not before; one that stays full loses frames (tx_dropped, once for each frame and participant) and is not
  * waited for again until it has taken a frame.
  *
+ * Arrival: the kernel stamps a frame when it is sent; the stamp is brought to CLOCK_MONOTONIC, so that setting the wall clock
+ * makes no frame younger. Use the loop with the posix clock.
+ *
+ * Transmission: what send() takes is out. When every participant lost it, send() gives 0, and the frame may be offered
+ * again. When some took it, or there are no others, it is out.
+ *
+ * State: gone when the folder, or the own socket in it, was deleted; restart() makes them anew.
+ *
  * Memory: the object is the caller's (about 160 KiB: make it static); the operating system's thread and directory
  * functions allocate.
  */
@@ -26,8 +34,9 @@
 #include <sys/un.h>
 #include <time.h>
 
+#include "canopy/acceptance.h"
 #include "canopy/can.h"
-#include "canopy/can/acceptance.h"
+#include "canopy/can/arrival.h"
 #include "canopy/ring.h"
 #include "canopy/status.h"
 
@@ -61,12 +70,14 @@ typedef struct {
 typedef struct {
     canopy_can_t can; /**< The driver: hand &unixbus.can to the loop. */
     const canopy_can_acceptance_t *acceptance;
+    char bus[sizeof(((struct sockaddr_un *)NULL)->sun_path)]; /* as it was named */
     int socket;
     int event; /* eventfd that the thread counts up after each frame */
     pthread_t thread;
     atomic_bool stopping;
     atomic_int failure; /* errno that ended the thread */
     _Atomic uint32_t malformed;
+    canopy_arrival_t arrival; /* the thread's */
     _Atomic uint32_t error_frames;
     uint32_t received;
     uint32_t sent;
@@ -81,12 +92,12 @@ typedef struct {
  *
  * @param self        the object
  * @param bus         a name ("bus0"), or the path of a folder if it contains a slash
- * @param acceptance  filter, which lives as long as the driver is open; NULL: every data and remote frame
+ * @param acceptance  filter, which lives as long as the driver is open
  * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT: NULL, a bad name or filter, or (errno ENAMETOOLONG) a path too long for a
  *         socket; CANOPY_ERROR_NOT_FOUND: the folder's parent does not exist; CANOPY_ERROR_IO: another failure, with
  *         errno (EPERM: the default folder belongs to somebody else or can be written by others).
  *
- * Later errors: CANOPY_ERROR_BUS_DOWN from send: the folder or the own socket in it was deleted, open anew.
+ * Later errors: CANOPY_ERROR_BUS_DOWN from send: the folder or the own socket in it was deleted.
  */
 canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, const canopy_can_acceptance_t *acceptance);
 

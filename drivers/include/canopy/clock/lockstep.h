@@ -35,12 +35,19 @@
 /** Failed waits in a row after which the run is ended. */
 #define CANOPY_LOCKSTEP_FAILURES_MAX 50u
 
+/** Length of a wait until a frame is out [us], and how many of them; and how often the outcome is asked for at most. */
+#define CANOPY_LOCKSTEP_POLL_US 1000u
+#define CANOPY_LOCKSTEP_SEND_WAITS 100u
+#define CANOPY_LOCKSTEP_SEND_POLLS 100000u
+
 /** The pair. Owned by the caller, stays where it is; members but `can` and `clock` are private. */
 typedef struct {
     /**
      * For the loop. receive() gives the frames of the current step, then 0 until the next one; step frames themselves
-     * are kept back. send() is the inner driver's. wait is NULL. stats() are the inner driver's with the own losses
-     * added to rx_dropped, and received and rx_high_water as the loop sees them.
+     * are kept back; their time is now, for time stands still while they come. send() waits until the inner driver knows that
+     * the frame is out, CANOPY_LOCKSTEP_SEND_WAITS times CANOPY_LOCKSTEP_POLL_US at most; then it gives
+     * CANOPY_ERROR_BUS_DOWN. state and restart are the inner driver's. wait is NULL. stats() are the inner driver's with
+     * the own losses added to rx_dropped, and received and rx_high_water as the loop sees them.
      */
     canopy_can_t can;
     /**
@@ -52,7 +59,8 @@ typedef struct {
     const atomic_bool *stop;
     uint32_t step_id;
     canopy_time_t now;
-    bool joined; /* `last` holds the last step frame */
+    bool in_flight; /* a frame is with the inner driver */
+    bool joined;    /* `last` holds the last step frame */
     canopy_can_frame_t last;
     uint32_t received;
     uint32_t overwritten;

@@ -32,13 +32,13 @@ typedef struct {
  *
  * @param record  path of the record
  * @param sent    path of a new file for the frames that the controller sends, one that is there is overwritten; NULL: none
- * @param inputs  the application's CanopyInputs: `app->trace->inputs`
+ * @param trace   the application's trace: `app->trace`
  * @param message receives one line for people when it fails: what was wrong, and the way out
  * @return CANOPY_OK; CANOPY_ERROR_NOT_FOUND, CANOPY_ERROR_IO: a file; or what canopy_replay_init() says. On an error all is
  *         closed.
  */
 canopy_error_t canopy_replay_open(canopy_replay_files_t *self, const char *record, const char *sent,
-                                  canopy_trace_id_t inputs, char *message, size_t message_size);
+                                  const canopy_trace_config_t *trace, char *message, size_t message_size);
 
 /**
  * Closes both files.

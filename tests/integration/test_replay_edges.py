@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: MIT
+"""canopy replay at the edges of the tick: what is said of arrivals, and commands that never left."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from e2e.p11 import e2e_p11_protect
+
+from canopy.cli import main
+from integration import logs
+from integration.test_replay import (
+    ARRIVALS,
+    BATTERY,
+    CHANGE,
+    HEALTH,
+    POSTURE_COMMAND,
+    POWER_COMMAND,
+    SNAPSHOT,
+    TICK,
+    Log,
+    differs,
+    flip,
+    model_file,
+    place_of,
+    refused,
+)
+
+TICKS = 220
+COMMANDS = (POWER_COMMAND, POSTURE_COMMAND)
+NAMES = {POWER_COMMAND: "PowerCommand", POSTURE_COMMAND: "PostureCommand"}
+
+
+@pytest.fixture(scope="module")
+def original(build_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Log:
+    return logs.make_log(build_dir, "nao_home", TICKS, tmp_path_factory.mktemp("log"), seed=5)
+
+
+@pytest.fixture
+def log(original: Log) -> Log:
+    """A copy to spoil."""
+    return copy.deepcopy(original)
+
+
+@pytest.fixture
+def replay(build_dir: Path, tmp_path: Path) -> Callable[..., Result]:
+    """Replays a log with nao_home."""
+
+    def run(messages: Log, *options: str) -> Result:
+        path = logs.write_log(tmp_path / "run.log", messages)
+        command = ["replay", str(path), "--model", str(model_file(build_dir))]
+        return CliRunner().invoke(main, [*command, "--program", str(build_dir / "examples/nao/nao_home"), *options])
+
+    return run
+
+
+def is_equal(result: Result) -> dict[str, int]:
+    """What a replay without differences says as JSON."""
+    assert result.exit_code == 0, (result.output, result.exception)
+    data: dict[str, int] = json.loads(result.stdout)
+    assert data["equal"]
+    return data
+
+
+def tick_of(log: Log, place: int) -> int:
+    """Of a command the tick whose CanopyTick comes next, of a trace frame that of the last one."""
+    step = 1 if log[place].arbitration_id in COMMANDS else -1
+    at = next(i for i in range(place, len(log) if step == 1 else -1, step) if log[i].arbitration_id == TICK)
+    return int.from_bytes(log[at].data[1:5], "little")
+
+
+def protect_again(log: Log) -> None:
+    """Gives the commands consecutive counters, as a controller does that has not sent those that are missing."""
+    counters = dict.fromkeys(COMMANDS, 0)
+    for message in log:
+        number = message.arbitration_id
+        if number in COMMANDS:
+            message.data[1] = message.data[1] & 0xF0 | counters[number]
+            e2e_p11_protect(message.data, number, increment_counter=False)
+            counters[number] = (counters[number] + 1) % 15
+
+
+def drop(log: Log, places: Collection[int], counted: int | None = None) -> Log:
+    """The log without commands that were replaced or expired, counted as so many (None: right) a tick later."""
+    ticks = sorted(tick_of(log, place) for place in places)
+    for place, message in enumerate(log):
+        if message.arbitration_id == HEALTH:
+            dropped = sum(tick < tick_of(log, place) for tick in ticks)
+            message.data[4:6] = (dropped if counted is None else min(dropped, counted)).to_bytes(2, "little")
+    left = [message for place, message in enumerate(log) if place not in places]
+    protect_again(left)
+    return left
+
+
+def places_of(log: Log, identifier: int, ticks: Collection[int]) -> set[int]:
+    return {place_of(log, identifier, tick) for tick in ticks}
+
+
+# --- arrivals ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_log_has_what_is_tested(log: Log) -> None:
+    arrivals = [message.data for message in log if message.arbitration_id == ARRIVALS]
+    ages = {int.from_bytes(data[1:3], "little") for data in arrivals if data[0] & 0x30}
+    assert {0, 17, 120, 499, 500, 65535} <= ages
+    assert set(logs.BUS_STATES) == {data[0] & 0x4F for data in arrivals}
+    assert sum(data[0] & 0x30 == 0 for data in arrivals) > 5
+
+
+@pytest.mark.parametrize("byte", [0, 1, 2, 3, 4, 7])
+def test_changed_arrivals_are_seen(replay: Callable[..., Result], log: Log, byte: int) -> None:
+    place = place_of(log, ARRIVALS, 90)
+    assert tick_of(log, place) == 90
+    flip(log[place], byte)
+    result = replay(log)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("canopy replay: "), result.stderr
+    assert "--ticks 9" in result.stderr
+    assert replay(log, "--ticks", "90").exit_code == 0
+
+
+def test_a_changed_return_is_a_difference(replay: Callable[..., Result], log: Log) -> None:
+    """It is not in Check: but other commands follow from it, or at least another CanopyArrivals."""
+    place = next(i for i, m in enumerate(log) if m.arbitration_id == ARRIVALS and m.data[0] & 0x40)
+    flip(log[place], 0, 0x40)
+    differs(replay(log, "--json"), tick_of(log, place))
+
+
+def test_lost_arrivals_are_named(replay: Callable[..., Result], log: Log) -> None:
+    places = [i for i, m in enumerate(log) if m.arbitration_id == ARRIVALS]
+    for kind in (0x00, 0x10, 0x20):
+        place = next(i for i in places if log[i].data[0] & 0x30 == kind and tick_of(log, i) > 40)
+        tick = tick_of(log, place)
+        left = log[:place] + log[place + 1 :]
+        if kind == 0 and log[place].data[0] & 0x0F == 0:
+            continue
+        refused(replay(left), f"CanopyArrivals of tick {tick} is missing", f"--ticks {tick} replays")
+        assert replay(left, "--ticks", str(tick)).exit_code == 0
+
+
+def test_many_frames_in_a_tick(build_dir: Path, tmp_path: Path, replay: Callable[..., Result]) -> None:
+    """More than Taken can count: it tells their number modulo 256."""
+    robot = logs.Robot(3)
+    steps = [
+        logs.Step(1_000_000 + 50_000 * tick, [robot.sensor("Battery") for _ in range(count)], {BATTERY: 3})
+        for tick, count in enumerate((2, 1, 300, 1, 256, 2, 520, 0, 3, 3, 3))
+    ]
+    sent = logs.run_program(build_dir / "examples" / "nao" / "nao_home", steps, tmp_path)
+    log = [message for step, answer in zip(steps, sent, strict=False) for message in (*step.frames, *answer)]
+    data = is_equal(replay(logs.stamped(log), "--json"))
+    assert (data["ticks"], data["inputs"]) == (len(steps), 2 + 1 + 300 + 1 + 256 + 2 + 520 + 9)
+
+
+# --- commands that have not left --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("replaced", [1, 3, 14, 15, 100])
+def test_replaced_commands_are_no_difference(replay: Callable[..., Result], log: Log, replaced: int) -> None:
+    places = places_of(log, POSTURE_COMMAND, range(60, 60 + replaced)) | places_of(log, POWER_COMMAND, {60, 63, 110})
+    data = is_equal(replay(drop(log, places), "--json"))
+    assert (data["ticks"], data["dropped"]) == (TICKS, replaced + 3)
+    told = replay(drop(log, set()))
+    assert told.exit_code == 0
+
+
+def test_dropped_commands_are_told(replay: Callable[..., Result], log: Log) -> None:
+    result = replay(drop(log, places_of(log, POWER_COMMAND, {0, 1, 70})))
+    assert result.exit_code == 0, result.output
+    assert result.stdout.endswith("all equal; 3 more did not leave, as CanopyHealth has counted\n")
+
+
+@pytest.mark.parametrize("identifier", COMMANDS)
+def test_more_are_missing_than_were_counted(replay: Callable[..., Result], log: Log, identifier: int) -> None:
+    places = places_of(log, identifier, {50, 51, 52, 99, 130})
+    (found,) = differs(replay(drop(log, places, counted=3), "--json"), 99)
+    assert (found["message"], found["what"], found["recorded"]) == (NAMES[identifier], "frame", "none")
+    (found,) = differs(replay(drop(log, places, counted=0), "--json"), 50)
+
+
+def test_what_is_counted_too_late_is_a_difference(replay: Callable[..., Result], log: Log) -> None:
+    """CanopyHealth of the ticks 120 to 160 counts none of what is missing since tick 99."""
+    left = drop(log, places_of(log, POWER_COMMAND, {99}))
+    for place, message in enumerate(left):
+        if message.arbitration_id == HEALTH and tick_of(left, place) <= 160:
+            message.data[4:6] = bytes(2)
+    differs(replay(left, "--json"), 99)
+
+
+def test_a_command_that_the_recorder_lost_was_not_dropped(replay: Callable[..., Result], log: Log) -> None:
+    """TxDropped would cover it, but the counter of the next one shows that it was out."""
+    left = drop(log, places_of(log, POWER_COMMAND, {40}))
+    for place, message in enumerate(left):
+        if message.arbitration_id == HEALTH and tick_of(left, place) >= 99:
+            message.data[4] += 1
+    del left[place_of(left, POWER_COMMAND, 99)]
+    (found,) = differs(replay(left, "--json"), 100)
+    assert (found["message"], found["what"]) == ("PowerCommand", "E2E_Counter")
+    assert int(found["recorded"]) == (int(found["replayed"]) + 1) % 15
+
+
+@pytest.mark.parametrize(("byte", "what"), [(0, "E2E_CRC"), (1, "E2E_Counter")])
+def test_wrong_protection_is_a_difference(replay: Callable[..., Result], log: Log, byte: int, what: str) -> None:
+    place = place_of(log, POSTURE_COMMAND, 117)
+    flip(log[place], byte)
+    (found,) = differs(replay(log, "--json"), 117)
+    assert (found["message"], found["what"], found["frame"]) == ("PostureCommand", what, place + 1)
+
+
+def test_a_changed_command_is_named_where_others_are_missing(replay: Callable[..., Result], log: Log) -> None:
+    left = drop(log, places_of(log, POSTURE_COMMAND, {60, 61, 115, 119}))
+    place = place_of(left, POSTURE_COMMAND, 117)
+    left[place].data[2] = 0x7
+    protect_again(left)
+    found = differs(replay(left, "--json"), 117)
+    assert ("PostureCommand", "Mode", place + 1) in [(one["message"], one["what"], one["frame"]) for one in found]
+
+
+def test_health_and_model_may_be_dropped_too(replay: Callable[..., Result], log: Log) -> None:
+    left = drop(log, places_of(log, HEALTH, {100}) | places_of(log, 0x605, {100}))
+    assert is_equal(replay(left, "--json"))["dropped"] == 2
+    left = drop(log, places_of(log, HEALTH, {100}), counted=0)
+    (found,) = differs(replay(left, "--json"), 100)
+    assert found["message"] == "CanopyHealth"
+
+
+def test_changes_and_snapshots_may_be_dropped_too(replay: Callable[..., Result], log: Log) -> None:
+    """What a replay needs is there. More than was counted is a gap."""
+    change = next(i for i, m in enumerate(log) if m.arbitration_id == CHANGE and tick_of(log, i) > 110)
+    places = places_of(log, SNAPSHOT, {50, 51, 99, 180}) | {change}
+    data = is_equal(replay(drop(log, places), "--json"))
+    assert (data["ticks"], data["dropped"]) == (TICKS, 5)
+    refused(replay(drop(log, places, counted=2)), "1 trace frames are missing, or 1 more than 256", "--ticks 99")
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 4])
+@pytest.mark.parametrize("first", [0, 80])
+def test_commands_overtake_the_trace(replay: Callable[..., Result], log: Log, ticks: int, first: int) -> None:
+    """On a loaded bus the trace waits, up to four periods, and commands of the next ticks leave first."""
+    for replaced in (set(), {first}, {first + 1, first + ticks}):
+        left = drop(log, places_of(log, POSTURE_COMMAND, replaced))
+        start = next(i for i, m in enumerate(left) if m.arbitration_id == POWER_COMMAND and tick_of(left, i) == first)
+        end = place_of(left, POWER_COMMAND, first + ticks + 1)
+        commands = [message for message in left[start:end] if message.arbitration_id < TICK]
+        trace = [message for message in left[start:end] if message.arbitration_id >= TICK]
+        data = is_equal(replay(left[:start] + commands + trace + left[end:], "--json"))
+        assert (data["ticks"], data["dropped"]) == (TICKS, len(replaced))

@@ -1,0 +1,407 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * What the loop makes of a bus that floods it, loses frames, fails and comes back: what leaves see, what the fault hook
+ * is told, and what leaves first.
+ */
+#include <string.h>
+
+#include "fake_can.h"
+#include "fake_mailboxes.h"
+#include "small_app.h"
+#include "unity.h"
+
+enum { HEALTH_ID = 0x603, ARRIVALS_ID = 0x607, FAULTS = 8 };
+
+/* In the documents and in logs of the field. */
+_Static_assert(CANOPY_FAULT_LEAF_STATUS == 1 && CANOPY_FAULT_OVERRUN == 2 && CANOPY_FAULT_CAN_RECEIVE == 3 &&
+                   CANOPY_FAULT_RX_BACKLOG == 4 && CANOPY_FAULT_RX_LOST == 5 && CANOPY_FAULT_CAN_STATE == 6 &&
+                   CANOPY_FAULT_TX_EXPIRED == 7,
+               "numbers of faults are stable");
+
+static small_memory_t memory;
+static canopy_app_t app;
+static canopy_can_t can;
+static canopy_time_t clock_now;
+static unsigned faults[FAULTS];
+static uint32_t details[FAULTS];
+static canopy_loop_config_t config;
+static canopy_loop_t loop;
+
+static canopy_time_t now(void *context)
+{
+    (void)context;
+    return clock_now;
+}
+
+static bool never_wait(void *context, canopy_time_t deadline)
+{
+    (void)context;
+    (void)deadline;
+    return false;
+}
+
+static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
+
+static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
+{
+    (void)context;
+    faults[fault]++;
+    details[fault] = detail;
+}
+
+static void start(const canopy_can_t *driver)
+{
+    can = *driver;
+    app = small_app(&memory);
+    config = (canopy_loop_config_t){.app = &app, .can = &can, .clock = &fake_clock, .on_fault = on_fault};
+    clock_now = 0;
+    memset(faults, 0, sizeof faults);
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+}
+
+void setUp(void)
+{
+    fake_can_reset();
+    start(&fake_can);
+}
+
+void tearDown(void)
+{
+}
+
+static void use_mailboxes(void)
+{
+    static const canopy_can_t boxes_can = {
+        .receive = boxes_receive, .send = boxes_send, .outcome = boxes_outcome, .abort = boxes_abort, .mailboxes = 1};
+
+    boxes_reset();
+    start(&boxes_can);
+}
+
+/** One period later, a cycle with so many more frames that have just arrived. */
+static void cycle(unsigned frames)
+{
+    clock_now += PERIOD_US;
+    for (unsigned frame = 0; frame < frames; frame++) {
+        fake.rx[fake.rx_count++] = (canopy_can_frame_t){.time = clock_now, .id = RX_ID + frame % RX, .length = 1};
+    }
+    (void)canopy_loop_cycle(&loop, clock_now);
+}
+
+/* --- too much, or lost ---------------------------------------------------------------------------------------------- */
+
+static void a_backlog_that_lasts_is_overload(void)
+{
+    cycle(3 * RX_MAX);
+    TEST_ASSERT_FALSE(seen.overload); /* a burst */
+    TEST_ASSERT_EQUAL_UINT(0, faults[CANOPY_FAULT_RX_BACKLOG]);
+    cycle(0);
+    TEST_ASSERT_TRUE(seen.overload);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_RX_BACKLOG]);
+    TEST_ASSERT_EQUAL_UINT32(2, details[CANOPY_FAULT_RX_BACKLOG]);
+    cycle(0);
+    TEST_ASSERT_TRUE(seen.overload); /* exactly full: more may be there */
+    TEST_ASSERT_EQUAL_UINT32(3, loop.rx_backlogs);
+    cycle(0);
+    TEST_ASSERT_FALSE(seen.overload);
+    cycle(RX_MAX);
+    TEST_ASSERT_FALSE(seen.overload); /* it counts from the start again */
+    TEST_ASSERT_EQUAL_UINT(2, faults[CANOPY_FAULT_RX_BACKLOG]);
+}
+
+static void frames_that_the_driver_has_lost_are_overload_in_the_next_cycle(void)
+{
+    fake.rx_dropped = 3;
+    cycle(0);
+    TEST_ASSERT_TRUE(seen.overload);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_RX_LOST]);
+    TEST_ASSERT_EQUAL_UINT32(3, details[CANOPY_FAULT_RX_LOST]);
+    cycle(0);
+    TEST_ASSERT_FALSE(seen.overload);
+    fake.rx_dropped = 5;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT32(2, details[CANOPY_FAULT_RX_LOST]);
+    TEST_ASSERT_EQUAL_UINT32(5, loop.rx_lost);
+    loop.rx_lost = UINT32_MAX - 1u; /* the driver's counter may wrap */
+    fake.rx_dropped = 2;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT32(4, details[CANOPY_FAULT_RX_LOST]);
+}
+
+static void a_driver_may_count_nothing(void)
+{
+    can.stats = NULL;
+    fake.rx_dropped = 3;
+    cycle(0);
+    TEST_ASSERT_FALSE(seen.overload);
+}
+
+/* --- the state of the bus ------------------------------------------------------------------------------------------- */
+
+static void leaves_and_fault_hook_are_told_the_state(void)
+{
+    cycle(0);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, seen.can_state);
+    TEST_ASSERT_EQUAL_UINT(0, faults[CANOPY_FAULT_CAN_STATE]);
+    fake.controller = CANOPY_CAN_CONTROLLER_PASSIVE;
+    cycle(0);
+    cycle(0);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_PASSIVE, seen.can_state);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_CAN_STATE]);
+    TEST_ASSERT_EQUAL_UINT32(CANOPY_CAN_ERROR_PASSIVE, details[CANOPY_FAULT_CAN_STATE]);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(2, faults[CANOPY_FAULT_CAN_STATE]);
+    TEST_ASSERT_EQUAL_UINT32(CANOPY_CAN_ERROR_ACTIVE, details[CANOPY_FAULT_CAN_STATE]);
+}
+
+static void a_failed_controller_is_restarted(void)
+{
+    fake.controller = CANOPY_CAN_CONTROLLER_BUS_OFF;
+    for (unsigned tick = 0; tick < 51u; tick++) {
+        cycle(0);
+    }
+    TEST_ASSERT_EQUAL_UINT(1, fake.restarts);
+}
+
+static void leaves_see_a_blocked_bus(void)
+{
+    use_mailboxes();
+    cycle(0);
+    cycle(0);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_BLOCKED, seen.can_state); /* in the cycle that begins at the deadline */
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_TX_EXPIRED]);
+    TEST_ASSERT_EQUAL_UINT32(1, details[CANOPY_FAULT_TX_EXPIRED]);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.tx_expired);
+    boxes_let_out(0);
+    cycle(0);
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, seen.can_state);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_TX_EXPIRED]);
+}
+
+static void expect_it_taken_back(void)
+{
+    TEST_ASSERT_EQUAL_UINT(1, boxes.aborts);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, boxes.box[0].id); /* the next one, whose deadline is later */
+}
+
+static void what_is_past_its_deadline_does_not_leave_while_the_next_tick_is_worked_out(void)
+{
+    use_mailboxes();
+    cycle(0);
+    while_ticking = expect_it_taken_back;
+    cycle(0);
+}
+
+static void faults_may_go_unheard(void)
+{
+    use_mailboxes();
+    config.on_fault = NULL;
+    fake.rx_dropped = 1;
+    can.stats = fake_can_stats;
+    can.context = &fake;
+    for (unsigned tick = 0; tick < 3u; tick++) {
+        cycle(0);
+    }
+    TEST_ASSERT_EQUAL_UINT32(2, loop.tx_expired);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.rx_lost);
+}
+
+/* --- back ----------------------------------------------------------------------------------------------------------- */
+
+/** How many of the frames that were sent in the last cycle carry this value. */
+static unsigned sent_with(uint8_t value)
+{
+    unsigned count = 0;
+
+    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
+        count += fake.tx[frame].data[0] == value ? 1u : 0u;
+    }
+    return count;
+}
+
+static void after_an_unusable_bus_every_messages_safe_value_is_the_first_that_leaves(void)
+{
+    cycle(0); /* tick 0 */
+    TEST_ASSERT_EQUAL_UINT(2, sent_with(WANTED));
+    fake.controller = CANOPY_CAN_CONTROLLER_BUS_OFF;
+    fake.tx_result = CANOPY_ERROR_BUS_DOWN;
+    fake.tx_count = 0;
+    cycle(0);
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(0, fake.tx_count);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    fake.tx_result = 1;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(2, fake.tx_count);
+    TEST_ASSERT_EQUAL_UINT(2, sent_with(SAFE));
+    TEST_ASSERT_EQUAL_HEX32(TX_ID, fake.tx[0].id);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, fake.tx[1].id);
+    fake.tx_count = 0;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(2, sent_with(WANTED)); /* tick 4 */
+    TEST_ASSERT_FALSE(loop.returning);
+}
+
+static void safe_values_go_on_until_they_are_known_to_be_out(void)
+{
+    use_mailboxes();
+    fake.controller = CANOPY_CAN_CONTROLLER_DOWN;
+    can.state = fake_can_state;
+    can.context = &fake;
+    cycle(0);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    for (unsigned tick = 0; tick < 5u; tick++) {
+        cycle(0);
+        TEST_ASSERT_TRUE(loop.returning);
+        TEST_ASSERT_TRUE(boxes.is_full[0]);
+        TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.box[0].data[0]);
+    }
+    boxes_let_out(0);
+    canopy_tx_service(&memory.tx, clock_now);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, boxes.box[0].id);
+    cycle(0); /* one of two */
+    TEST_ASSERT_TRUE(loop.returning);
+    boxes_let_out(0);
+    canopy_tx_service(&memory.tx, clock_now);
+    boxes_let_out(0);
+    canopy_tx_service(&memory.tx, clock_now);
+    cycle(0);
+    TEST_ASSERT_FALSE(loop.returning);
+    TEST_ASSERT_EQUAL_UINT8(WANTED, boxes.box[0].data[0]);
+    TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.out[boxes.out_count - 1u].data[0]);
+}
+
+/* --- the trace ------------------------------------------------------------------------------------------------------ */
+
+static void expect_sent(uint32_t id, const uint8_t data[8])
+{
+    TEST_ASSERT_GREATER_THAN_UINT(0, fake.tx_count);
+    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
+        if (fake.tx[frame].id == id) {
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(data, fake.tx[frame].data, 8);
+            fake.tx[frame].id = 0;
+            return;
+        }
+    }
+    TEST_FAIL_MESSAGE("no frame with this id");
+}
+
+static unsigned sent_of(uint32_t id)
+{
+    unsigned count = 0;
+
+    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
+        count += fake.tx[frame].id == id ? 1u : 0u;
+    }
+    return count;
+}
+
+static void arrivals_tell_the_age_of_each_message_of_which_a_frame_was_taken(void)
+{
+    static const uint8_t one[] = {0x10, 0x03, 0x00, 0, 0, 0, 0, 0xFE};
+    static const uint8_t first[] = {0x30, 0, 0, 0, 0, 0, 0, 0xFF};
+    static const uint8_t rest[] = {0x10, 0, 0, 0, 0, 0, 0, 0xFF};
+
+    trace.arrivals.id = ARRIVALS_ID;
+    loop.ticks = 0x12FD;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID)); /* nothing to tell */
+    fake.rx[fake.rx_count++] = (canopy_can_frame_t){.time = clock_now - 2000, .id = RX_ID + 2, .length = 1};
+    cycle(0);
+    expect_sent(ARRIVALS_ID, one);
+    fake.tx_count = 0;
+    cycle(4);
+    TEST_ASSERT_EQUAL_UINT(2, sent_of(ARRIVALS_ID));
+    expect_sent(ARRIVALS_ID, first);
+    expect_sent(ARRIVALS_ID, rest);
+    fake.tx_count = 0;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID));
+}
+
+static void arrivals_of_exactly_one_frame_are_one_frame(void)
+{
+    static const uint8_t three[] = {0x30, 0, 0, 0, 0, 0, 0, 0};
+
+    trace.arrivals.id = ARRIVALS_ID;
+    cycle(3);
+    TEST_ASSERT_EQUAL_UINT(1, sent_of(ARRIVALS_ID));
+    expect_sent(ARRIVALS_ID, three);
+}
+
+static void arrivals_tell_the_state_of_the_bus_when_it_has_changed(void)
+{
+    static const uint8_t passive[] = {0x02, 0, 0, 0, 0, 0, 0, 0};
+    static const uint8_t lost_too[] = {0x0A, 0, 0, 0, 0, 0, 0, 2};
+    static const uint8_t active[] = {0x00, 0, 0, 0, 0, 0, 0, 3};
+
+    trace.arrivals.id = ARRIVALS_ID;
+    fake.controller = CANOPY_CAN_CONTROLLER_PASSIVE;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, passive);
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID));
+    fake.rx_dropped = 1;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, lost_too);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, active);
+}
+
+static void arrivals_tell_that_safe_values_went_out_instead_of_the_trees(void)
+{
+    static const uint8_t down[] = {0x40 | CANOPY_CAN_DOWN, 0, 0, 0, 0, 0, 0, 0};
+    static const uint8_t back[] = {CANOPY_CAN_ERROR_ACTIVE, 0, 0, 0, 0, 0, 0, 1};
+
+    trace.arrivals.id = ARRIVALS_ID;
+    fake.controller = CANOPY_CAN_CONTROLLER_DOWN;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, down);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    cycle(0);
+    expect_sent(ARRIVALS_ID, back);
+}
+
+static void health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter(void)
+{
+    static const uint8_t open[] = {0, 0, 1, 0, 9, 0, 0, 0};
+    static const uint8_t filtered[] = {0, 0, 0xFF, 0xFF, 9, 0, 0, 0};
+
+    trace.health.id = HEALTH_ID;
+    memory.bus_state.counters.unknown_id = 1;
+    memory.tx.replaced = 2;
+    memory.tx.expired = 3;
+    loop.tx_expired = 3;
+    memory.tx.trace_late = 3;
+    memory.tx.trace_full = 1;
+    cycle(0);
+    expect_sent(HEALTH_ID, open);
+    can.is_filtered = true;
+    fake.tx_count = 0;
+    cycle(0);
+    expect_sent(HEALTH_ID, filtered);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_backlog_that_lasts_is_overload);
+    RUN_TEST(frames_that_the_driver_has_lost_are_overload_in_the_next_cycle);
+    RUN_TEST(a_driver_may_count_nothing);
+    RUN_TEST(leaves_and_fault_hook_are_told_the_state);
+    RUN_TEST(a_failed_controller_is_restarted);
+    RUN_TEST(leaves_see_a_blocked_bus);
+    RUN_TEST(what_is_past_its_deadline_does_not_leave_while_the_next_tick_is_worked_out);
+    RUN_TEST(faults_may_go_unheard);
+    RUN_TEST(after_an_unusable_bus_every_messages_safe_value_is_the_first_that_leaves);
+    RUN_TEST(safe_values_go_on_until_they_are_known_to_be_out);
+    RUN_TEST(arrivals_tell_the_age_of_each_message_of_which_a_frame_was_taken);
+    RUN_TEST(arrivals_of_exactly_one_frame_are_one_frame);
+    RUN_TEST(arrivals_tell_the_state_of_the_bus_when_it_has_changed);
+    RUN_TEST(arrivals_tell_that_safe_values_went_out_instead_of_the_trees);
+    RUN_TEST(health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter);
+    return UNITY_END();
+}
