@@ -15,9 +15,9 @@ from typing import Any
 import can
 from cantools.database.can import Database, Message, Signal
 
-from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
 from canopy.compiler.dbc_file import load_dbc
 from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.plant import PostureMode, PowerMode
 

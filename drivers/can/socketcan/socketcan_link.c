@@ -110,14 +110,15 @@ static void read_info(canopy_socketcan_link_t *link, const attribute_t *outer)
     }
 }
 
-static void read_link(canopy_socketcan_link_t *link, const struct nlmsghdr *answer)
+/** @param answer `length` bytes, which are a header and a struct ifinfomsg at least */
+static void read_link(canopy_socketcan_link_t *link, const char *answer, size_t length)
 {
-    const struct ifinfomsg *info = NLMSG_DATA(answer);
-    attributes_t attributes = {.next = (const char *)answer + NLMSG_SPACE(sizeof *info),
-                               .left = answer->nlmsg_len - NLMSG_LENGTH(sizeof *info)};
+    struct ifinfomsg info;
+    attributes_t attributes = {.next = answer + NLMSG_SPACE(sizeof info), .left = length - NLMSG_LENGTH(sizeof info)};
     const attribute_t *part;
 
-    *link = (canopy_socketcan_link_t){.has_echo = (info->ifi_flags & FLAG_ECHO) != 0u, .has_queue = true};
+    memcpy(&info, answer + NLMSG_HDRLEN, sizeof info);
+    *link = (canopy_socketcan_link_t){.has_echo = (info.ifi_flags & FLAG_ECHO) != 0u, .has_queue = true};
     while ((part = take(&attributes)) != NULL) {
         if (part->rta_type == IFLA_QDISC) {
             link->has_queue = !text_is(part, "noqueue"); /* while the interface is down it is "noop": not known yet */
@@ -152,7 +153,7 @@ bool canopy_socketcan_ask_link(unsigned index, canopy_socketcan_link_t *link)
         answer.header.nlmsg_len > (size_t)size || answer.header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
         return false;
     }
-    read_link(link, &answer.header);
+    read_link(link, answer.bytes, answer.header.nlmsg_len);
     return true;
 }
 

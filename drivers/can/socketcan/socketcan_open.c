@@ -116,19 +116,19 @@ static canopy_error_t bind_to(int descriptor, unsigned index)
     return errno == ENODEV ? CANOPY_ERROR_UNSUPPORTED : CANOPY_ERROR_IO;
 }
 
-/** Makes a socket, in the place of one that was open, so that its number stays. @return false, with errno. */
-static bool make_socket(int *descriptor)
+/** Makes a socket, in the place of one that was open, so that its number stays. @return 0, or a number of errno.h. */
+static int make_socket(int *descriptor)
 {
-    int made = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
-    bool good = made >= 0;
+    const int made = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+    int number = made >= 0 ? 0 : errno;
 
-    if (good && *descriptor >= 0) {
-        good = dup3(made, *descriptor, O_CLOEXEC) >= 0;
+    if (made >= 0 && *descriptor >= 0) {
+        number = dup3(made, *descriptor, O_CLOEXEC) >= 0 ? 0 : errno;
         (void)close(made);
-    } else if (good) {
+    } else if (made >= 0) {
         *descriptor = made;
     }
-    return good;
+    return number;
 }
 
 static void start_clock(canopy_socketcan_t *self)
@@ -172,9 +172,14 @@ static void start(canopy_socketcan_t *self, unsigned index)
 static canopy_error_t open_sockets(canopy_socketcan_t *self, unsigned index)
 {
     canopy_error_t error;
+    int number = make_socket(&self->socket);
 
-    if (!make_socket(&self->socket) || !make_socket(&self->events)) {
-        return errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT ? CANOPY_ERROR_UNSUPPORTED : CANOPY_ERROR_IO;
+    if (number == 0) {
+        number = make_socket(&self->events);
+    }
+    if (number != 0) {
+        errno = number;
+        return number == EAFNOSUPPORT || number == EPROTONOSUPPORT ? CANOPY_ERROR_UNSUPPORTED : CANOPY_ERROR_IO;
     }
     if (index == 0u) {
         errno = ENODEV;

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x8d8b2c7dddd69ce1u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x14f7344958d15596u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x8d8b2c7dddd69ce1u
+#if CANOPY_GENERATED_COOLER_APP_H != 0x14f7344958d15596u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x8d8b2c7dddd69ce1u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x14f7344958d15596u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -281,10 +281,7 @@ const canopy_app_t cooler_app = {
     .output = &memory.output,
     .rx = memory.rx,
     .tx = &memory.tx,
-    .tx_memory = {.slots = memory.tx_slots,
-                  .data = memory.tx_data,
-                  .trace = memory.tx_trace,
-                  .trace_capacity = 1u},
+    .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x87a0bfd999cb3584u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x46ac56d2eb228f67u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x87a0bfd999cb3584u
+#if CANOPY_GENERATED_COURIER_APP_H != 0x46ac56d2eb228f67u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x87a0bfd999cb3584u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x46ac56d2eb228f67u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -560,10 +560,7 @@ const canopy_app_t courier_app = {
     .output = &memory.output,
     .rx = memory.rx,
     .tx = &memory.tx,
-    .tx_memory = {.slots = memory.tx_slots,
-                  .data = memory.tx_data,
-                  .trace = memory.tx_trace,
-                  .trace_capacity = 16u},
+    .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 16u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xda6f4f2486deff35u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x6ca8e566c6a1c77du
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xda6f4f2486deff35u
+#if CANOPY_GENERATED_ROOM_APP_H != 0x6ca8e566c6a1c77du
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xda6f4f2486deff35u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x6ca8e566c6a1c77du
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -134,10 +134,7 @@ const canopy_app_t room_app = {
     .output = &memory.output,
     .rx = memory.rx,
     .tx = &memory.tx,
-    .tx_memory = {.slots = memory.tx_slots,
-                  .data = memory.tx_data,
-                  .trace = memory.tx_trace,
-                  .trace_capacity = 1u},
+    .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };

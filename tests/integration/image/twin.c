@@ -37,7 +37,8 @@ static int receive(void *context, canopy_can_frame_t *frame)
         return 0;
     }
     sent = tick;
-    *frame = (canopy_can_frame_t){.time = tick * UINT64_C(10000), .id = 0x18FECA15, .flags = CANOPY_CAN_EXTENDED, .length = 8};
+    *frame = (canopy_can_frame_t){
+        .time = tick * UINT64_C(10000), .id = 0x18FECA15, .flags = CANOPY_CAN_EXTENDED, .length = 8};
     frame->data[0] = (uint8_t)((temperature - 4096u) >> 8);
     frame->data[1] = (uint8_t)(temperature & 0xFFu);
     frame->data[2] = (uint8_t)(tick % 3u | (tick % 8u) << 3);
