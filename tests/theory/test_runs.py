@@ -35,7 +35,7 @@ def build(application: Application, folder: Path) -> ctypes.CDLL:
     sources = [Path(__file__).parent / "runs.c", NAO / "in_process.c", application.leaves, folder / "nao_codec.c"]
     sources += [folder / f"{application.name}_{part}.c" for part in ("app", "bus")]
     sources += [*(ROOT / "sim/plant/src").glob("*.c"), *(ROOT / "runtime/src").glob("*.c")]
-    sources += [ROOT / "drivers/can/loopback/loopback.c"]
+    sources += (ROOT / "drivers/can/loopback").glob("*.c")
     includes = [folder, NAO, *(ROOT / place / "include" for place in ("runtime", "drivers", "sim/plant"))]
     library = folder / "runs.so"
     compiler = [*shlex.split(os.environ.get("CC", "cc")), "-std=c11", "-O2", "-fPIC", "-shared"]

@@ -31,7 +31,7 @@ def test_both_logs_of_a_run_are_replayed(build_dir: Path, tmp_path: Path) -> Non
             Simulator(BUS, "--lock-step", "--no-lcm", "--steps", str(TICKS), "--posture", "0.5,0") as simulator,
             missions.ControllerProcess(build_dir, "nao_home", BUS, "--lock-step", "--ticks", str(TICKS)) as controller,
         ):
-            assert controller.wait()["dropped"] == 0
+            assert controller.wait()["expired"] == 0
             simulator.wait()
         summary = record.end()
     assert (summary["lost"], summary["trace_lost"], summary["starts"]) == (0, 0, 1)
