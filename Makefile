@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage golden fuzz proof test-portable
+.PHONY: coverage figures golden fuzz proof test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -28,7 +28,7 @@ demo: ## build both example applications and watch them bring the robot home (un
 
 test: ## install what is missing, build, run every test (QEMU and vcan included), quick ones first
 	$(SETUP)/ensure-packages test
-	$(SETUP)/make-venv can,lcm,test,verify,differential,bench
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench
 	@$(MAKE) test-host test-firmware test-python test-rig
 
 test-host: # unit tests on this machine
@@ -52,20 +52,24 @@ test-rig: # integration tests on vcan0: one guest for all of them
 golden: ## write tests/golden anew from what the compiler makes now; read the diff before you commit it
 	CANOPY_UPDATE_GOLDEN=1 $(PYTEST) tests/integration/test_golden.py
 
+figures: ## draw the phase portraits of docs/figures from the models of examples/
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench
+	PYTHONPATH=tests $(PYTHON) -m theory.figures
+
 lint: ## formatters, linters and type checker; nothing is changed
 	$(SETUP)/ensure-packages lint
-	$(SETUP)/make-venv can,lcm,test,verify,differential,bench,lint
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench,lint
 	$(call BUILD,host)
 	$(SETUP)/lint
 
 format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/ensure-packages demo
-	$(SETUP)/make-venv can,lcm,test,verify,differential,bench,lint
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench,lint
 	$(SETUP)/lint --fix
 
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
-	$(SETUP)/make-venv can,lcm,test,verify,differential
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential
 	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
@@ -107,7 +111,7 @@ proof: ## Frama-C on the engine, the loop, the codecs and the rings, for any inp
 
 bench: ## instructions, stack and memory of a tick, instructions of cycles, next to other engines; rewrites the tables of docs/benchmarks.md
 	$(SETUP)/ensure-packages bench
-	$(SETUP)/make-venv can,lcm,test,verify,differential,bench
+	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench
 	PYTHONPATH=tests $(PYTHON) -m bench --json build/bench.json --page docs/benchmarks.md
 
 clean: ## remove everything that was built

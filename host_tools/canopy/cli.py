@@ -18,6 +18,7 @@ SUBCOMMANDS = {
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
     "verify": ("canopy.verify.cli", "Prove what a tree guarantees, given a model of its leaves."),
+    "plot": ("canopy.plot.cli", "Draw what a tree does to a plant, given a model of its leaves."),
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
@@ -28,6 +29,9 @@ SUBCOMMANDS = {
     "bridge": ("canopy.bridge", "Publish a controller's trace on LCM."),
     "spy": ("canopy.spy", "Start lcm-spy with Canopy's message types."),
 }
+
+# Python package -> the extra that brings it, where the two have different names.
+EXTRAS = {"matplotlib": "plot"}
 
 
 class _LazyGroup(CleanCommand, click.Group):
@@ -43,7 +47,7 @@ class _LazyGroup(CleanCommand, click.Group):
         except ModuleNotFoundError as error:
             if error.name is None or error.name.startswith("canopy"):
                 raise
-            extra = "can" if error.name == "can" else error.name
+            extra = EXTRAS.get(error.name, error.name)
             echo(
                 f"canopy {cmd_name} needs the Python package '{error.name}': pip install 'canopy-bt[{extra}]'", err=True
             )

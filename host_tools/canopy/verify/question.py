@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.tree import Node, Tree
 from canopy.verify.checks import leak, nodes_of
 from canopy.verify.linear import Formula, everything
@@ -58,7 +58,7 @@ class Question:
         return [index for index in range(len(self.system.pieces)) if index not in self.goal]
 
 
-def node_named(claim: Claim, tree: Tree, name: object, what: str) -> Node:
+def node_named(place: Place, tree: Tree, name: object, what: str) -> Node:
     """A node by its path, or by its name where there is one of that name."""
     nodes = nodes_of(tree.root)
     found = [node for node in nodes if node.path == name] or [node for node in nodes if node.name == name]
@@ -66,10 +66,10 @@ def node_named(claim: Claim, tree: Tree, name: object, what: str) -> Node:
         known = [node.name for node in nodes] + [node.path for node in nodes]
         close = nearest(str(name), known)
         help_text = close if close.startswith("did you mean") else "give a node's name, or its path: TREE/NAME"
-        raise CompileError(claim.place, f"{what}: the tree has no node '{name}'", help_text)
+        raise CompileError(place, f"{what}: the tree has no node '{name}'", help_text)
     if len(found) > 1:
         raise CompileError(
-            claim.place,
+            place,
             f"{what}: the tree has {len(found)} nodes '{name}'",
             f"give the path of one: {', '.join(node.path for node in found)}",
         )
@@ -103,14 +103,14 @@ def _arbitrary(claim: Claim, reader: ModelReader, tree: Tree) -> dict[str, Arbit
     path = ("claims", str(claim.index), "arbitrary")
     result = {}
     for name, raw in reader.table(claim.options.get("arbitrary", {}), path, "'arbitrary'").items():
-        node = node_named(claim, tree, name, "arbitrary")
+        node = node_named(claim.place, tree, name, "arbitrary")
         result[node.path] = Arbitrary(reader.shorter(raw, path, reader.names))
     return result
 
 
 def _made(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree) -> list[Piece]:
     options = claim.options
-    root = node_named(claim, tree, options["of"], "of") if "of" in options else tree.root
+    root = node_named(claim.place, tree, options["of"], "of") if "of" in options else tree.root
     made = pieces(Regions(plant, _arbitrary(claim, reader, tree)), root)
     if "disturbance" not in options:
         return made
