@@ -277,3 +277,33 @@ def test_comparisons_that_a_mask_decides_do_not_warn(tmp_path: Path, code: str) 
     assert result.exit_code == 0, result.output
     sources = [str(file) for file in (tmp_path / "out").glob("*.c")]
     subprocess.run(["gcc", *WARNINGS, f"-I{ROOT / 'runtime' / 'include'}", "-fsyntax-only", *sources], check=True)
+
+
+def test_more_frames_in_a_period_than_c_counts_are_refused(tmp_path: Path) -> None:
+    dbc = DBC.replace('"GenMsgCycleTime" 100', '"GenMsgCycleTime" 3600000')
+    result = run(tmp_path, "--bitrate", "100000000", dbc=dbc, period=3_600_000)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("--bitrate: error: the number of frames that a bus of 100000000 bit/s carries")
+    assert run(tmp_path, "--bitrate", "50000000", dbc=dbc, period=3_600_000).exit_code == 0
+
+
+@pytest.mark.parametrize(("messages", "fits"), [(511, True), (512, False)])
+def test_buffers_that_a_uint16_cannot_address_are_refused(tmp_path: Path, messages: int, fits: bool) -> None:
+    sent = "".join(f'BO_ {n + 10} M{n}: 64 Controller\n SG_ X : 0|8@1+ (1,0) [0|100] "" B\n\n' for n in range(messages))
+    formats = ",".join(
+        f'"{name}"' for name in ("StandardCAN", "ExtendedCAN", *(f"r{n}" for n in range(12)), "StandardCAN_FD")
+    )
+    tail = f'BA_DEF_ BO_ "VFrameFormat" ENUM {formats};\nBA_DEF_DEF_ "VFrameFormat" "StandardCAN_FD";\n'
+    dbc = (
+        DBC.replace("BO_ 1 A: 8 Controller", sent + "BO_ 1 A: 0 B").replace(
+            ' SG_ X : 0|8@1+ (1,0) [0|100] "" B\n\nBO_ 2', "\nBO_ 2"
+        )
+        + tail
+    )
+    result = run(tmp_path, dbc=dbc.replace('"GenMsgCycleTime" 100', '"GenMsgCycleTime" 1000000'))
+    if fits:
+        assert result.exit_code == 0, result.output
+    else:
+        expect_refused(
+            tmp_path, result, "b.dbc", "bytes of two buffers for each message that node 'Controller' sends: 65536"
+        )

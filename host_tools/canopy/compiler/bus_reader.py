@@ -218,6 +218,8 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
             receive.append(_read_message(dbc, message))
     for message in receive + send:
         _check_frame(dbc.text.message(dbc.database.get_message_by_name(message.name)), message)
+    buffers = sum(2 * message.length for message in send)  # places in them: canopy_tx_message_t.place
+    count(buffers, f"bytes of two buffers for each message that node '{node}' sends", place)
     bus = dataclasses.replace(_make_bus(path, dbc, node, receive, send, trace, name), load=_load(dbc))
     _check_outputs(dbc, bus.send, period_ms)
     return bus

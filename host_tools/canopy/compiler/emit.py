@@ -39,6 +39,7 @@ from canopy.compiler.leaf_c import (
     stale_test,
     text_constants,
 )
+from canopy.compiler.limits import FRAMES, whole
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType
 from canopy.compiler.row_c import place_constant, row_fields
@@ -139,6 +140,13 @@ def load_application(
     """
     if not is_c_identifier(name) or name != snake(name):
         raise CompileError(Place("--name"), f"'{name}' is not a lower-case C identifier", f"for example {snake(name)}")
+    whole(
+        frames_in(period_ms * 1000, bitrate),
+        FRAMES,
+        f"the number of frames that a bus of {bitrate} bit/s carries in {period_ms} ms",
+        Place("--bitrate"),
+        "state the bus's bit rate, or take a shorter period",
+    )
     options = options or Options(include=include)
     parsed = read_tree(tree, options)
     bus = read_bus(dbc, node, period_ms, name)

@@ -39,6 +39,8 @@ DATA_ID = Limits(-1, 0xFFFF)
 """E2EDataId; -1: none."""
 RAW = Limits(-(2**63), 2**64 - 1)
 """What the widest signals hold."""
+FRAMES = Limits(1, 2**32 - 1)
+"""canopy_app_t.rx_max: frames that the bus can carry in a period."""
 BITRATE = Limits(1_000, 100_000_000, "bit/s")
 
 PORTS_MAX = 1_000

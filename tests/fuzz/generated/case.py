@@ -40,6 +40,10 @@ def make_case(seed: int, number: int, top: Path) -> Case:
     case = Case(seed, number, top / f"case_{number}", f"case_{number}")
     case.folder.mkdir(parents=True, exist_ok=True)
     period_ms = rng.choice([1, 10, 100])
+    other = random.Random(f"{seed}:{number}:bit rate")  # of its own: the files stay those of the seed
+    if other.random() < 0.05:
+        period_ms = 3_600_000
+    bitrate = other.choice([1_000, 500_000, 100_000_000])
     bus = BusMaker(rng, hostile, period_ms)
     tree = TreeMaker(rng, hostile, bus.inputs, bus.outputs)
     xml, dbc = tree.xml(), bus.dbc()
@@ -56,7 +60,7 @@ def make_case(seed: int, number: int, top: Path) -> Case:
         dbc_file.write_text(dbc, encoding=rng.choice(["cp1252", "utf-8"]), errors="replace", newline="")
         options = Options(floats=tree.floats, unset_ports=True)
         application = load_application(
-            case.name, tree_file, dbc_file, "Controller", period_ms, 500_000, None, options, images
+            case.name, tree_file, dbc_file, "Controller", period_ms, bitrate, None, options, images
         )
         files = render(application)
     except CompileError as error:
