@@ -103,7 +103,8 @@ def all_runs(every_inner: bool) -> list[Run]:
         for name in sorted(types, key=lambda name: name not in heavy)
     ]
     loop = [
-        f"runtime/src/{part}.c" for part in ("tree", "bus", "can_state", "loop", "trace", "tx", "tx_service", "e2e")
+        f"runtime/src/{part}.c"
+        for part in ("tree", "bus", "can_state", "loop", "loop_run", "trace", "tx", "tx_service", "e2e")
     ]
     generated = [str(path) for path in sorted(application.glob("*.c"))]
     runs += [
