@@ -44,7 +44,7 @@ extern const canopy_can_t board_can;
 
 def block(language: str, marker: str) -> str:
     """The first block of the guide in this language that has the marker in it."""
-    found = re.findall(rf"^```{language}\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
+    found: list[str] = re.findall(rf"^```{language}\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
     return next(text for text in found if marker in text)
 
 
