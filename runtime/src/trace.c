@@ -17,10 +17,15 @@ static void send_tick(const canopy_trace_sink_t *sink, const canopy_trace_tick_t
     const canopy_trace_config_t *config = sink->config;
     canopy_trace_state_t *state = sink->state;
     canopy_tx_trace_data_t data = {{0, CANOPY_TRACE_VERSION << 4}};
+    unsigned number = canopy_trace_number(state);
 
+    if (tick->tick == 0u && number == 0u && state->has_begun) {
+        number = canopy_trace_number(state); /* 0 and 0 together is the start, not tick 2^32 */
+    }
+    state->has_begun = true;
     canopy_trace_put16(&data.byte[2], tick->tick);
     canopy_trace_put16(&data.byte[4], tick->tick >> 16);
-    data.byte[6] = (uint8_t)(canopy_trace_number(state) | flags);
+    data.byte[6] = (uint8_t)(number | flags);
     data.byte[7] = (uint8_t)((unsigned)tick->root | ((unsigned)values << 3) | ((tick->overruns & 3u) << 6));
     if (config->data_id != CANOPY_E2E_NONE) {
         canopy_e2e_protect((uint16_t)config->data_id, state->counter, data.byte, CANOPY_TX_TRACE_LENGTH);
@@ -110,20 +115,41 @@ static void send_inputs(const canopy_trace_sink_t *sink, const canopy_trace_tick
     }
 }
 
-static void send_model(const canopy_trace_sink_t *sink, canopy_time_t now)
+static void send_model(const canopy_trace_sink_t *sink)
 {
     const canopy_tree_t *tree = sink->tree->tree;
     canopy_tx_trace_data_t data = {{CANOPY_TRACE_VERSION << 4}};
-    canopy_tx_trace_data_t clock = {{(CANOPY_TRACE_VERSION << 4) | 1u}};
 
     canopy_trace_put16(&data.byte[1], tree->hash);
     canopy_trace_put16(&data.byte[3], tree->hash >> 16);
     canopy_trace_put16(&data.byte[5], tree->node_count);
     canopy_trace_post(sink, CANOPY_TRACE_MODEL, &data);
-    canopy_trace_put16(&clock.byte[1], sink->tick);
-    canopy_trace_put16(&clock.byte[3], (uint32_t)((now >> 24) & 0xFFFFu));
-    clock.byte[5] = (uint8_t)((now >> 40) & 0xFFu);
-    canopy_trace_post(sink, CANOPY_TRACE_MODEL, &clock);
+}
+
+static void send_clock(const canopy_trace_sink_t *sink, uint32_t upper)
+{
+    canopy_tx_trace_data_t data = {{(CANOPY_TRACE_VERSION << 4) | 1u}};
+
+    canopy_trace_put16(&data.byte[1], sink->tick);
+    canopy_trace_put16(&data.byte[3], upper);
+    data.byte[5] = (uint8_t)((upper >> 16) & 0xFFu);
+    canopy_trace_post(sink, CANOPY_TRACE_MODEL, &data);
+}
+
+/** Which tree this is, at a slow rate, and the upper bits of the time, also when they change. */
+static void send_slow(const canopy_trace_sink_t *sink, canopy_time_t now)
+{
+    canopy_trace_state_t *state = sink->state;
+    uint32_t upper = (uint32_t)((now >> 24) & 0xFFFFFFu);
+    bool is_due = canopy_trace_is_due(&state->model_in, sink->config->model_every);
+
+    if (is_due) {
+        send_model(sink);
+    }
+    if (is_due || upper != state->upper) {
+        send_clock(sink, upper);
+        state->upper = upper;
+    }
 }
 
 void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self, canopy_tree_instance_t *tree,
@@ -147,6 +173,7 @@ void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t
               (shows ? (unsigned)HAS_SNAPSHOT : 0u) | (first < tree->tree->node_count ? (unsigned)HAS_CHANGES : 0u),
               choice.count);
     send_inputs(&sink, tick);
+    send_slow(&sink, tick->cycle->now);
     if (shows) {
         snapshot.byte[0] = canopy_trace_number(self);
         canopy_trace_post(&sink, CANOPY_TRACE_SNAPSHOT, &snapshot);
@@ -156,9 +183,6 @@ void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t
     }
     if (choice.count > 0u) {
         canopy_trace_values(&sink, tree->application, &choice);
-    }
-    if (canopy_trace_is_due(&self->model_in, config->model_every)) {
-        send_model(&sink, tick->cycle->now);
     }
 }
 

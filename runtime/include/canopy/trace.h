@@ -72,6 +72,7 @@ typedef struct {
     uint8_t *sent;         /**< node_count: the status told last of each node, as canopy_tree_instance_t.status has it. */
     uint32_t *told;        /**< value_count: the values told last. */
     uint32_t taken;        /**< canopy_bus_state_t.taken after the tick before. */
+    uint32_t upper;        /**< Bits 24 to 47 of the time of the tick before. */
     uint16_t next_node;    /**< Where the search for changed nodes begins. */
     uint16_t next_shown;   /**< Where the next snapshot begins. */
     uint16_t next_value;   /**< Where the search for changed values begins. */
@@ -83,6 +84,7 @@ typedef struct {
     uint8_t health_page;
     uint8_t sequence;
     uint8_t counter; /**< E2E. */
+    bool has_begun;
 } canopy_trace_state_t;
 
 /** What goes with a tick into the trace. */
