@@ -82,6 +82,7 @@ typedef struct {
     uint16_t health_in;
     uint16_t model_in;
     uint8_t health_page;
+    uint8_t announcements; /**< Ticks that tell which tree it is though it is not due. */
     uint8_t sequence;
     uint8_t counter; /**< E2E. */
     bool has_begun;
