@@ -221,19 +221,19 @@ static void far_nodes_are_skipped_to_or_begin_a_frame(void)
 
 static void what_does_not_fit_comes_with_the_next_ticks_in_turn(void)
 {
-    static const uint8_t results[] = {S, F, K};
+    static const uint8_t results[] = {S, F, K, R, HALTED};
     const uint8_t *frame;
 
     config.changes_max = 2;
     start(40);
     for (unsigned round = 0; round < 8u; round++) {
-        memset(status, results[round % 3u], 40); /* all of them, in every tick */
+        memset(status, results[round % 5u], 40); /* all of them, in every tick */
         trace();
         TEST_ASSERT_EQUAL_UINT(2, count_of(CANOPY_TRACE_CHANGE));
         frame = frame_of(CANOPY_TRACE_CHANGE, 0);
         TEST_ASSERT_EQUAL_UINT8(round * 10u % 40u, (frame[1] & 0xFu) * 16u + (frame[3] >> 4));
         TEST_ASSERT_EQUAL_UINT8(2, frame_of(CANOPY_TRACE_CHANGE, 1)[0] >> 6);
-        TEST_ASSERT_EACH_EQUAL_HEX8(results[round % 3u] | OLD, status, 40);
+        TEST_ASSERT_EACH_EQUAL_HEX8(results[round % 5u] | OLD, status, 40);
     }
     memset(status, F, 40);
     for (unsigned left = 0; left < 3u; left++) {
