@@ -17,17 +17,14 @@ typedef struct {
     uint16_t unsigned_half;
     int32_t word;
     uint64_t whole;
+    uint32_t single; /* in place of a float: the bits of one */
+    uint64_t twice;
 } values_t;
 
-#define VALUE(member, signed_, high)                                                                       \
-    {                                                                                                      \
-        .offset = offsetof(values_t, member), .size = sizeof(((values_t *)0)->member), .is_signed = signed_, \
-        .is_high = high                                                                                    \
-    }
-static const canopy_trace_value_t traced[] = {VALUE(small, true, false),          VALUE(byte, false, false),
-                                              VALUE(half, true, false),           VALUE(unsigned_half, false, false),
-                                              VALUE(word, true, false),           VALUE(whole, false, false),
-                                              VALUE(whole, false, true)};
+#define VALUE(member, its_kind) {.offset = offsetof(values_t, member), .kind = CANOPY_TRACE_##its_kind}
+static const canopy_trace_value_t traced[] = {
+    VALUE(small, I8),  VALUE(byte, U8),   VALUE(half, I16),      VALUE(unsigned_half, U16),     VALUE(word, WORD),
+    VALUE(whole, LOW), VALUE(whole, HIGH), VALUE(single, FLOAT), VALUE(twice, DOUBLE_LOW), VALUE(twice, DOUBLE_HIGH)};
 enum { SLOTS = sizeof traced / sizeof traced[0] };
 
 static small_memory_t memory;
@@ -346,7 +343,7 @@ static void values_are_told_when_they_change(void)
     cycle(0);
     TEST_ASSERT_EQUAL_UINT(0, count_of(CANOPY_TRACE_VALUE));
     TEST_ASSERT_EQUAL_HEX8(0, frame_of(CANOPY_TRACE_TICK, 0)->data[7] & 0x38);
-    values = (values_t){-2, 254, -3, 65533, -4, UINT64_C(0x1122334455667788)};
+    values = (values_t){-2, 254, -3, 65533, -4, UINT64_C(0x1122334455667788), 0, 0};
     cycle(0);
     TEST_ASSERT_EQUAL_HEX8(7u << 3, frame_of(CANOPY_TRACE_TICK, 0)->data[7] & 0x38);
     TEST_ASSERT_EQUAL_UINT(7, count_of(CANOPY_TRACE_VALUE));
@@ -360,12 +357,19 @@ static void values_are_told_when_they_change(void)
     TEST_ASSERT_EQUAL_UINT8(0, frame_of(CANOPY_TRACE_VALUE, 6)->data[2]);
     cycle(0);
     TEST_ASSERT_EQUAL_UINT(0, count_of(CANOPY_TRACE_VALUE));
+    values.single = 0x3FC00000;
+    values.twice = UINT64_C(0x400921FB54442D18);
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(3, count_of(CANOPY_TRACE_VALUE));
+    expect_value(0, 7, 0x3FC00000);
+    expect_value(1, 8, 0x54442D18);
+    expect_value(2, 9, 0x400921FB);
 }
 
 static void values_that_do_not_fit_come_in_turn(void)
 {
     trace_values(2, 60000);
-    values = (values_t){1, 1, 1, 1, 1, 1};
+    values = (values_t){1, 1, 1, 1, 1, 1, 0, 0};
     cycle(0);
     expect_value(0, 0, 1);
     expect_value(1, 1, 1);

@@ -13,8 +13,10 @@
 enum { NODES_MAX = 1000, PLACES = 64, ID = 0x600 };
 enum { R = 7, S = 8, F = 9, K = 10, WAS = 16, OLD = 32, NEVER = 32, HALTED = 19 }; /* canopy/status_code.h */
 
-static uint8_t status[NODES_MAX];
-static uint8_t sent[NODES_MAX];
+static uint32_t status_words[NODES_MAX / 4 + 1];
+static uint32_t sent_words[NODES_MAX / 4];
+static uint8_t *const status = (uint8_t *)status_words;
+static uint8_t *const sent = (uint8_t *)sent_words;
 static canopy_tree_t tree;
 static canopy_tree_instance_t instance;
 static canopy_bus_t bus;
@@ -29,7 +31,7 @@ static uint32_t tick;
 static void start(uint16_t nodes)
 {
     tree = (canopy_tree_t){.node_count = nodes};
-    memset(status, NEVER, sizeof status);
+    memset(status_words, NEVER, sizeof status_words);
     canopy_trace_start(&config, &state, nodes);
     state.snapshot_in = (uint16_t)(config.snapshot_every - 1u); /* not at once */
     tick = 0;
@@ -154,12 +156,12 @@ static void a_tick_in_which_nothing_happens_is_two_frames(void)
 
 static void a_node_that_is_ticked_again_with_the_same_result_is_no_change(void)
 {
-    memset(status, S, sizeof status);
+    memset(status, S, 20);
     trace();
     TEST_ASSERT_EQUAL_UINT(4, count_of(CANOPY_TRACE_CHANGE)); /* 20 nodes, five in a frame */
     for (unsigned again = 0; again < 3u; again++) {
         TEST_ASSERT_EACH_EQUAL_HEX8(S | OLD, status, 20);
-        memset(status, S, sizeof status); /* the tick stores it */
+        memset(status, S, 20); /* the tick stores it */
         trace();
         TEST_ASSERT_EQUAL_UINT(0, count_of(CANOPY_TRACE_CHANGE));
     }
