@@ -59,7 +59,7 @@ static const canopy_bus_t bus = {
     .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_cycle = set_cycle};
-static const canopy_trace_value_t value = {.size = 1};
+static const canopy_trace_value_t value = {.kind = CANOPY_TRACE_U8};
 static canopy_trace_config_t trace;
 
 /* A clock whose every reading and deadline the test gives. */
