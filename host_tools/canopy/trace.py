@@ -28,7 +28,6 @@ __all__ = ["CAN_STATES", "BusState", "Health", "NodeState", "Status", "TraceDeco
 _FRAME_BYTES = 8
 _SEQUENCES = 64
 _TICKS = 1 << 32
-_BACK = 1 << 31  # a tick number that seems to have advanced by more has gone back
 _MORE_AGES = 3
 _HEALTH_OVERRUNS_MAX = 0xFFFF
 
@@ -88,9 +87,9 @@ def mismatch(model: Model, data: bytes) -> str | None:
 def other_version(model: Model, version: int) -> str:
     """What to say of a trace of another version."""
     return (
-        f"{model.path}: the frames with the id 0x{model.trace.base:X} are no CanopyTick of trace version {VERSION}, but "
-        f"of version {version}, or of an older one without a number, or somebody else's; use the release of Canopy that "
-        "the firmware was built with"
+        f"{model.path}: the frames with the id 0x{model.trace.base:X} are no CanopyTick of trace version {VERSION}, "
+        f"but of version {version}, or of an older one without a number, or somebody else's; use the release of Canopy "
+        "that the firmware was built with"
     )
 
 
@@ -192,8 +191,10 @@ class TraceDecoder:
 
     def _advance(self, last: int, frame: TickFrame) -> None:
         """From the CanopyTick before to this one: what is missing in between, or that the controller was restarted."""
-        advance = (frame.tick - last) % _TICKS
-        if advance == 0 or advance >= _BACK:
+        advance = frame.tick - last % _TICKS
+        if advance == 1 - _TICKS:
+            advance = 1  # 0 behind the largest number
+        if advance < 1:
             self.restarts += 1
             self.health, self.bus = Health(), None
             self._last_tick, self._sequence, self._overruns = frame.tick, frame.sequence, frame.overruns
@@ -239,7 +240,7 @@ class TraceDecoder:
         if not codes or NO_CODE in codes or set(frame.codes[len(codes) :]) - {NO_CODE}:
             return self._refuse()
         tick = self._tick
-        if tick is None or not tick.expects_snapshot(frame, self._missing(frame.sequence)):
+        if tick is None or not tick.expects_snapshot(frame):
             return self._take_foreign(frame.sequence)
         self._follow(frame.sequence)
         tick.take_snapshot()
@@ -251,7 +252,7 @@ class TraceDecoder:
         if frame is None or frame.nodes[-1] >= len(self._codes):
             return self._refuse()
         tick, missing = self._tick, self._missing(frame.sequence)
-        if tick is None or not tick.expects_change(frame, missing, self.model.trace.changes_max):
+        if tick is None or not tick.expects_change(frame, self.model.trace.changes_max):
             return self._take_foreign(frame.sequence)
         if not tick.goes_round(frame):
             return self._refuse()

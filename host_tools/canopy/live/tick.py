@@ -24,6 +24,10 @@ class OpenTick:
         self.is_followed = False
         """Some frame of the trace has come behind CanopyTick."""
         self.values_left = frame.values
+        self._sequence = frame.sequence
+        self._has_snapshot = frame.has_snapshot
+        self._place = 0
+        """Of the last frame about nodes: how many numbers behind CanopyTick's."""
         self._inputs_left = True
         self._has_inputs = False
         self._arrivals_left = False
@@ -33,7 +37,6 @@ class OpenTick:
         self._runs: list[tuple[int, int]] = []
         """First and last node of CanopyChange frames that follow each other without a gap."""
         self._first = 0
-        self._changes = 0  # frames, with those that are known to be missing
         self._is_intact = True
         self._has_values = False
 
@@ -71,21 +74,27 @@ class OpenTick:
         self._inputs_left = False
         self._arrivals_left = self._has_inputs and not frame.is_last
 
-    def expects_snapshot(self, frame: SnapshotFrame, missing: int) -> bool:
-        """Is it this tick's? Then no frame with a number is missing before it."""
+    def expects_snapshot(self, frame: SnapshotFrame) -> bool:
+        """Is it this tick's? Then its number is the next one behind CanopyTick's."""
         begun = self.told or self._has_values
-        return self._snapshot_left and not missing and not begun and frame.tick == self.number % 8
+        fits = frame.tick == self.number % 8 and self._distance(frame.sequence) == 1
+        return self._snapshot_left and not begun and fits
 
     def take_snapshot(self) -> None:
         """It is this tick's."""
         self._snapshot_left = False
+        self._place = 1
         self._pass_ages()
 
-    def expects_change(self, frame: ChangeFrame, missing: int, most: int) -> bool:
-        """Can it be this tick's, with so many frames missing before it, and `most` CanopyChange at most?"""
-        if not self._changes_left or self._has_values or frame.tick != self.number % 16:
-            return False
-        return self._changes + missing - self._snapshot_left < most
+    def expects_change(self, frame: ChangeFrame, most: int) -> bool:
+        """Can it be this tick's, with `most` CanopyChange at most?"""
+        fits = frame.tick == self.number % 16
+        place = self._distance(frame.sequence)
+        return self._changes_left and not self._has_values and fits and self._place < place <= most + self._has_snapshot
+
+    def _distance(self, sequence: int) -> int:
+        """How many numbers behind CanopyTick's. A tick has fewer than 64."""
+        return (sequence - self._sequence) % 64
 
     def goes_round(self, frame: ChangeFrame) -> bool:
         """Are its nodes behind those before: going up, begun once more at 0 at most, ended before the first one?"""
@@ -96,8 +105,8 @@ class OpenTick:
         return self.last >= self._first > frame.nodes[-1]
 
     def take_change(self, frame: ChangeFrame, missing: int) -> None:
-        """Notes what comes behind it, when it is this tick's."""
-        self._changes += max(0, missing - self._snapshot_left) + 1
+        """Notes what comes behind it, when it is this tick's, with so many frames missing before it."""
+        self._place = self._distance(frame.sequence)
         self._is_intact &= not missing and not self._snapshot_left
         self._snapshot_left = False
         self._pass_ages()

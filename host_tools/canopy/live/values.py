@@ -28,6 +28,8 @@ class ValueState:
         """For people, with its unit; "unknown", and a question mark behind what may be another by now."""
         if self.known is None:
             return "unknown"
+        if self.known == "" and self.value.words:
+            return "none" + ("" if self.certain else "?")
         if isinstance(self.known, bool):
             text = "true" if self.known else "false"
         else:
@@ -44,7 +46,7 @@ def meaning(value: TraceValue, texts: tuple[str, ...], slots: tuple[int, ...]) -
         return number if math.isfinite(number) else str(number)
     if value.type == "text":
         return texts[bits] if bits < len(texts) else f"text {bits}"
-    whole = bits - (1 << width) if not value.type.startswith("u") and bits >> (width - 1) else bits
+    whole = bits - (1 << width) if value.type.startswith("int") and bits >> (width - 1) else bits
     if whole in value.words:
         return value.words[whole]
     if value.type == "bool":
