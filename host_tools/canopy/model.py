@@ -23,6 +23,7 @@ PERIOD_US_MAX = 3_600_000_000
 LINE_MAX = 2**31 - 1
 DATA_ID_MAX = 0xFFFF
 SLOTS_MAX = 4096
+CHANGES_MAX = 32
 KNOWN_MS_MAX = 2**53
 
 T = TypeVar("T")
@@ -203,7 +204,7 @@ class _Reader:
             base=self._number(trace, where, "base", 0, (2**29 if extended else 2**11) - len(MESSAGES)),
             extended=extended,
             guard=guard,
-            changes_max=self._number(trace, where, "changes_max", 1, 61),
+            changes_max=self._number(trace, where, "changes_max", 1, CHANGES_MAX),
             known_within_ms=self._number(trace, where, "known_within_ms", 0, KNOWN_MS_MAX),
             values=values,
             texts=self._list(trace, where, "texts", self._name),
@@ -229,7 +230,7 @@ class _Reader:
             type=type_name,
             slot=self._number(data, place, "slot", 0, SLOTS_MAX - 1),
             scale=self._scale(data, place),
-            unit=self._get(data, place, "unit", str) if "unit" in data else "",
+            unit=self._get(data, place, "unit", str) if "unit" in data else "ms" if type_name == "duration" else "",
             words={self._number(words, f"{place}enum.", name, -(2**63), 2**64 - 1): name for name in words},
         )
 

@@ -4,9 +4,9 @@
 Pure: no clock, no bus. Any bytes may be fed; what is no trace frame of this model is refused, counted, and changes
 nothing else.
 
-What is shown as certain is so. After a lost frame every code that was received before is unknown, until a CanopyChange or
-a CanopySnapshot brings it again; and where the controller says that it could not tell all, what it has not told is not
-certain.
+What is shown as certain is so. After a lost frame every code that was received before is unknown, until a CanopyChange
+or a CanopySnapshot brings it again; and where the controller says that it could not tell all, what it has not told is
+not certain.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from canopy.live.codes import NO_CODE, NOTHING_KNOWN, UNKNOWN, NodeState, Status
-from canopy.live.frames import SNAPSHOT_NODES, ChangeFrame, SnapshotFrame, TickFrame, ValueFrame
+from canopy.live.frames import SNAPSHOT_NODES, ArrivalsFrame, ChangeFrame, SnapshotFrame, TickFrame, ValueFrame
 from canopy.live.health import CAN_STATES, BusState, Health, read_bus_state, read_health
 from canopy.live.tick import OpenTick
 from canopy.live.trace_model import VERSION
@@ -28,7 +28,7 @@ __all__ = ["CAN_STATES", "BusState", "Health", "NodeState", "Status", "TraceDeco
 _FRAME_BYTES = 8
 _SEQUENCES = 64
 _TICKS = 1 << 32
-_BACK = 1 << 31  # a tick number that seems to have advanced by more has gone back
+_MORE_AGES = 3
 _HEALTH_OVERRUNS_MAX = 0xFFFF
 
 Views = tuple["TreeView", ...]
@@ -87,9 +87,9 @@ def mismatch(model: Model, data: bytes) -> str | None:
 def other_version(model: Model, version: int) -> str:
     """What to say of a trace of another version."""
     return (
-        f"{model.path}: the frames with the id 0x{model.trace.base:X} are no CanopyTick of trace version {VERSION}, but of "
-        f"version {version} or of an older one without a number, or somebody else's; use the release of Canopy that the "
-        "firmware was built with"
+        f"{model.path}: the frames with the id 0x{model.trace.base:X} are no CanopyTick of trace version {VERSION}, "
+        f"but of version {version}, or of an older one without a number, or somebody else's; use the release of Canopy "
+        "that the firmware was built with"
     )
 
 
@@ -123,7 +123,7 @@ class TraceDecoder:
             for name, taker in (
                 ("CanopyTick", self._take_tick),
                 ("CanopyInputs", self._take_inputs),
-                ("CanopyArrivals", lambda _: ()),  # for replays
+                ("CanopyArrivals", self._take_arrivals),
                 ("CanopySnapshot", self._take_snapshot),
                 ("CanopyChange", self._take_change),
                 ("CanopyValue", self._take_value),
@@ -146,7 +146,14 @@ class TraceDecoder:
         taker = self._takers.get(identifier)
         if taker is None:
             return ()
-        return taker(data) if len(data) == _FRAME_BYTES else self._refuse()
+        if len(data) != _FRAME_BYTES:
+            return self._refuse()
+        refused, tick = self.refused, self._tick
+        views = taker(data)
+        if self._tick is None:
+            return views
+        self._tick.is_followed |= self._tick is tick and self.refused == refused
+        return views + self._finish() if self._tick.is_over else views
 
     def flush(self) -> Views:
         """Gives up waiting for the rest of the tick at hand; call it when the bus has been silent for some periods."""
@@ -168,24 +175,26 @@ class TraceDecoder:
         if frame.root_status not in range(Status.RUNNING, Status.SKIPPED + 1):
             return self._refuse()
         views = self._finish()
-        wraps = self._last_tick is not None and self._last_tick % _TICKS == _TICKS - 1
+        goes_on = self._last_tick is not None and self._last_tick % _TICKS == _TICKS - 1
         if self._last_tick is None:
             self._last_tick, self._overruns = frame.tick, frame.overruns
             self._follow(frame.sequence)
             self.lost += self._gap
         else:
             self._advance(self._last_tick, frame)
-        if frame.tick == 0 and not wraps:
+        if frame.tick == frame.sequence == 0 and not goes_on:
             self._know_the_start()
         self._gap = 0
         self._slots.begin()
         self._tick = OpenTick(self._last_tick, frame)
-        return views + self._finish_when_all_is_there()
+        return views
 
     def _advance(self, last: int, frame: TickFrame) -> None:
         """From the CanopyTick before to this one: what is missing in between, or that the controller was restarted."""
-        advance = (frame.tick - last) % _TICKS
-        if advance == 0 or advance >= _BACK:
+        advance = frame.tick - last % _TICKS
+        if advance == 1 - _TICKS:
+            advance = 1  # 0 behind the largest number
+        if advance < 1:
             self.restarts += 1
             self.health, self.bus = Health(), None
             self._last_tick, self._sequence, self._overruns = frame.tick, frame.sequence, frame.overruns
@@ -210,10 +219,20 @@ class TraceDecoder:
         state = read_bus_state(data)
         if state is None:
             return self._refuse()
+        if self._tick is None or self._tick.is_followed:
+            return self._take_foreign(None)
         self.bus = state
-        if self._tick is not None:
-            self._tick.inputs_left = False
-        return self._finish_when_all_is_there()
+        self._tick.take_inputs(data[5] >> 5 & 3 == _MORE_AGES)
+        return ()
+
+    def _take_arrivals(self, data: bytes) -> Views:
+        frame = ArrivalsFrame.read(data)
+        if frame is None:
+            return self._refuse()
+        if self._tick is None or not self._tick.expects_arrivals(frame):
+            return self._take_foreign(None)
+        self._tick.take_arrivals(frame)
+        return ()
 
     def _take_snapshot(self, data: bytes) -> Views:
         frame = SnapshotFrame.read(data)
@@ -221,20 +240,22 @@ class TraceDecoder:
         if not codes or NO_CODE in codes or set(frame.codes[len(codes) :]) - {NO_CODE}:
             return self._refuse()
         tick = self._tick
-        if tick is None or not tick.expects_snapshot(frame, self._missing(frame.sequence)):
+        if tick is None or not tick.expects_snapshot(frame):
             return self._take_foreign(frame.sequence)
         self._follow(frame.sequence)
-        tick.snapshot_left = False
+        tick.take_snapshot()
         self._tell(tick, range(frame.first, frame.first + SNAPSHOT_NODES), codes)
-        return self._finish_when_all_is_there()
+        return ()
 
     def _take_change(self, data: bytes) -> Views:
         frame = ChangeFrame.read(data)
         if frame is None or frame.nodes[-1] >= len(self._codes):
             return self._refuse()
         tick, missing = self._tick, self._missing(frame.sequence)
-        if tick is None or not tick.expects_change(frame, missing, self.model.trace.changes_max):
+        if tick is None or not tick.expects_change(frame, self.model.trace.changes_max):
             return self._take_foreign(frame.sequence)
+        if not tick.goes_round(frame):
+            return self._refuse()
         if missing and tick.last is not None:
             self._forget_between(tick.last, frame.nodes[0])
             self._follow(frame.sequence, forget=False)
@@ -242,18 +263,20 @@ class TraceDecoder:
             self._follow(frame.sequence)
         tick.take_change(frame, missing)
         self._tell(tick, frame.nodes, frame.codes)
-        return self._finish_when_all_is_there()
+        return ()
 
     def _take_value(self, data: bytes) -> Views:
         frame = ValueFrame.read(data)
-        if not self._slots.is_slot(frame.slot):
+        if not self._slots.has(frame.slot):
             return self._refuse()
         tick = self._tick
         if tick is None or not tick.expects_value(frame):
             return self._take_foreign(None)
-        tick.values_left -= 1
+        if self._slots.was_told(frame.slot):
+            return self._refuse()
+        tick.take_value()
         self._slots.take(frame.slot, frame.bits, frame.more)
-        return self._finish_when_all_is_there()
+        return ()
 
     def _take_foreign(self, sequence: int | None) -> Views:
         """A frame of a tick whose CanopyTick was lost. So the one at hand is over."""
@@ -312,22 +335,18 @@ class TraceDecoder:
         self._states = (NOTHING_KNOWN,) * len(self._codes)
         self._slots.forget()
 
-    def _finish_when_all_is_there(self) -> Views:
-        tick = self._tick
-        return self._finish() if tick is not None and tick.is_over and not tick.inputs_left else ()
-
     def _finish(self) -> Views:
         tick, self._tick = self._tick, None
         if tick is None:
             return ()
-        if tick.nodes_left:
-            self._forget_codes()
-        if not self._settled:
+        if not (self._settled and tick.tells_all):
             self._states = tuple(
                 self._state(tick, code, before, node)
                 for node, (code, before) in enumerate(zip(self._codes, self._states, strict=True))
             )
-            self._settled = not tick.more_wait
+            self._settled = tick.tells_all
+        if tick.nodes_left:
+            self._forget_codes()
         view = TreeView(
             tick=tick.number,
             root_status=Status(tick.root_status),
@@ -347,7 +366,7 @@ class TraceDecoder:
 
     @staticmethod
     def _state(tick: OpenTick, code: int, before: NodeState, node: int) -> NodeState:
-        """Of a node at the end of a tick; `before`: at the end of the last one, with nothing known where one was missed."""
+        """Of a node when a tick is over; `before`: when the last one was, with nothing known where one was missed."""
         if code == UNKNOWN:
             return NOTHING_KNOWN
         if not tick.tells(node):

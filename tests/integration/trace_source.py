@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A controller's trace, written from the tables and the words of docs/trace.md alone: it shares no code with the decoder."""
+"""A controller's trace, written from docs/trace.md alone: it shares no code with the decoder."""
 
 from __future__ import annotations
 
@@ -199,6 +199,7 @@ class TraceSource:
     def __post_init__(self) -> None:
         self.told = [0] * self.nodes
         self.told_slots = [0] * self.slots
+        self._has_begun = False
         self._counter = 0
         self._part = 0
         self._next_node = 0
@@ -212,6 +213,9 @@ class TraceSource:
         snapshot = self._snapshot(codes) if self.tick % self.snapshot_every == 0 else None
         changes = self._changes(codes)
         told = self._values([*values, *self.told_slots[len(values) :]])
+        if self.tick == 0 and self.sequence == 0 and self._has_begun:
+            self.sequence = 1  # only a start has both
+        self._has_begun = True
         head = self._tick_frame(
             Tick=self.tick,
             HasSnapshot=int(snapshot is not None),
@@ -299,7 +303,8 @@ class TraceSource:
         if told:
             self._next_slot = told[-1] + 1
         if self.tick % self.values_every == 0 and len(told) < self.values_max:
-            told.append(self._refreshed_slot)
+            if self._refreshed_slot not in told:
+                told.append(self._refreshed_slot)
             self._refreshed_slot = (self._refreshed_slot + 1) % self.slots
         for slot in told:
             self.told_slots[slot] = values[slot]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The trace's status codes: 4 bits that say of a node, after a tick, what it returned last and whether it was ticked."""
+"""The trace's status codes: 4 bits that say what a node has returned last, and whether it was ticked."""
 
 from __future__ import annotations
 

@@ -41,6 +41,22 @@ class TickFrame(NamedTuple):
         )
 
 
+class ArrivalsFrame(NamedTuple):
+    """CanopyArrivals."""
+
+    tick: int
+    """Modulo 16."""
+    is_last: bool
+    ages: bytes
+    """Of the list of ages."""
+
+    @staticmethod
+    def read(data: bytes) -> ArrivalsFrame | None:
+        """From 8 bytes; None where they say what cannot be."""
+        count = data[0] >> 4 & 7
+        return ArrivalsFrame(data[0] & 15, bool(data[0] & 0x80), data[1 : 1 + count]) if count else None
+
+
 class SnapshotFrame(NamedTuple):
     """CanopySnapshot."""
 

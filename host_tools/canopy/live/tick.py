@@ -3,94 +3,143 @@
 
 from __future__ import annotations
 
-from canopy.live.frames import ChangeFrame, SnapshotFrame, TickFrame, ValueFrame
+from canopy.live.frames import ArrivalsFrame, ChangeFrame, SnapshotFrame, TickFrame, ValueFrame
 
-_ALL_TOLD = 1
 _NODES_WAIT = 2
 
 
 class OpenTick:
     """What CanopyTick has announced, and what has come of it.
 
-    In the order of the bus: CanopySnapshot, CanopyChange, CanopyValue.
+    In the order of the bus: CanopyInputs, CanopyArrivals, CanopySnapshot, CanopyChange, CanopyValue.
     """
 
     def __init__(self, number: int, frame: TickFrame) -> None:
         self.number = number
         self.root_status = frame.root_status
-        self.inputs_left = True
-        """CanopyInputs. It belongs to no tick that is lost, so without it a tick is complete nevertheless."""
-        self.snapshot_left = frame.has_snapshot
-        self.changes_left = frame.has_changes
-        self.values_left = frame.values
         self.told: set[int] = set()
         """Nodes that a CanopySnapshot or a CanopyChange has named."""
         self.last: int | None = None
         """Named by a CanopyChange."""
+        self.is_followed = False
+        """Some frame of the trace has come behind CanopyTick."""
+        self.values_left = frame.values
+        self._sequence = frame.sequence
+        self._has_snapshot = frame.has_snapshot
+        self._place = 0
+        """Of the last frame about nodes: how many numbers behind CanopyTick's."""
+        self._inputs_left = True
+        self._has_inputs = False
+        self._arrivals_left = False
+        self._snapshot_left = frame.has_snapshot
+        self._changes_left = frame.has_changes
+        self._more = 0
+        self._runs: list[tuple[int, int]] = []
+        """First and last node of CanopyChange frames that follow each other without a gap."""
         self._first = 0
-        self._more = _ALL_TOLD
-        self._changes = 0  # frames, with those that are known to be missing
-        self._intact = True
+        self._is_intact = True
+        self._has_values = False
 
     @property
     def nodes_left(self) -> bool:
         """Frames about nodes are still to come."""
-        return self.snapshot_left or self.changes_left
+        return self._snapshot_left or self._changes_left
+
+    @property
+    def is_complete(self) -> bool:
+        """All that was announced of nodes and values has come."""
+        return self._is_intact and not (self.nodes_left or self.values_left)
 
     @property
     def is_over(self) -> bool:
         """Nothing is to come any more."""
-        return not (self.nodes_left or self.values_left)
+        return not (self._inputs_left or self._arrivals_left or self.nodes_left or self.values_left)
 
     @property
-    def is_complete(self) -> bool:
-        """All that was announced has come."""
-        return self._intact and self.is_over
+    def tells_all(self) -> bool:
+        """What it has not named has not changed."""
+        return self._is_intact and not self.nodes_left and self._more != _NODES_WAIT
 
-    @property
-    def more_wait(self) -> bool:
-        """More nodes have changed than fit."""
-        return self._more == _NODES_WAIT
+    def take_inputs(self, has_more_ages: bool) -> None:
+        """CanopyInputs has come."""
+        self._inputs_left, self._has_inputs, self._arrivals_left = False, True, has_more_ages
 
-    def expects_snapshot(self, frame: SnapshotFrame, missing: int) -> bool:
-        """Is it this tick's? Then it comes right behind the CanopyTick."""
-        return self.snapshot_left and not missing and self.last is None and frame.tick == self.number % 8
+    def expects_arrivals(self, frame: ArrivalsFrame) -> bool:
+        """Can it be this tick's? It tells nothing when CanopyInputs is missing."""
+        begun = self.told or self._has_values
+        return frame.tick == self.number % 16 and not begun and (self._arrivals_left or not self._has_inputs)
 
-    def expects_change(self, frame: ChangeFrame, missing: int, most: int) -> bool:
-        """Can it be this tick's, with so many frames missing before it, and `most` CanopyChange at most?"""
-        if not self.changes_left or frame.tick != self.number % 16 or self.snapshot_left > missing:
-            return False
-        if self._changes + missing - self.snapshot_left >= most:
-            return False
-        if self.last is None or self.last < frame.nodes[0]:
-            begins_again = self.last is not None and self.last < self._first
-            return not begins_again or frame.nodes[-1] < self._first
+    def take_arrivals(self, frame: ArrivalsFrame) -> None:
+        """Notes what comes behind it, when it is this tick's."""
+        self._inputs_left = False
+        self._arrivals_left = self._has_inputs and not frame.is_last
+
+    def expects_snapshot(self, frame: SnapshotFrame) -> bool:
+        """Is it this tick's? Then its number is the next one behind CanopyTick's."""
+        begun = self.told or self._has_values
+        fits = frame.tick == self.number % 8 and self._distance(frame.sequence) == 1
+        return self._snapshot_left and not begun and fits
+
+    def take_snapshot(self) -> None:
+        """It is this tick's."""
+        self._snapshot_left = False
+        self._place = 1
+        self._pass_ages()
+
+    def expects_change(self, frame: ChangeFrame, most: int) -> bool:
+        """Can it be this tick's, with `most` CanopyChange at most?"""
+        fits = frame.tick == self.number % 16
+        place = self._distance(frame.sequence)
+        return self._changes_left and not self._has_values and fits and self._place < place <= most + self._has_snapshot
+
+    def _distance(self, sequence: int) -> int:
+        """How many numbers behind CanopyTick's. A tick has fewer than 64."""
+        return (sequence - self._sequence) % 64
+
+    def goes_round(self, frame: ChangeFrame) -> bool:
+        """Are its nodes behind those before: going up, begun once more at 0 at most, ended before the first one?"""
+        if self.last is None:
+            return True
+        if self.last < frame.nodes[0]:
+            return self.last >= self._first or frame.nodes[-1] < self._first
         return self.last >= self._first > frame.nodes[-1]
 
     def take_change(self, frame: ChangeFrame, missing: int) -> None:
-        """Notes what comes behind it, when it is this tick's."""
-        self._changes += missing - self.snapshot_left + 1
-        self._intact &= not missing
-        self.snapshot_left = False
+        """Notes what comes behind it, when it is this tick's, with so many frames missing before it."""
+        self._place = self._distance(frame.sequence)
+        self._is_intact &= not missing and not self._snapshot_left
+        self._snapshot_left = False
+        self._pass_ages()
+        first = frame.nodes[0]
         if self.last is None:
-            self._first = frame.nodes[0]
+            self._first = first
+        elif not missing:
+            first = self._runs.pop()[0]
+        self._runs.append((first, frame.nodes[-1]))
         self.last = frame.nodes[-1]
-        if frame.more:
-            self.changes_left = False
-            self._more = frame.more
+        self._changes_left = not frame.more
+        self._more = frame.more
 
     def expects_value(self, frame: ValueFrame) -> bool:
         """Can it be this tick's?"""
         return self.values_left > 0 and frame.tick == self.number % 16
 
-    def tells(self, node: int) -> bool:
-        """Is the code that was told last of this node that of this tick, when nothing of the tick is missing?"""
-        return not self.more_wait or node in self.told or self._spans(node)
+    def take_value(self) -> None:
+        """One of this tick's."""
+        self.values_left -= 1
+        self._has_values = True
+        self._pass_ages()
 
-    def _spans(self, node: int) -> bool:
-        """Between the first node and the last one that CanopyChange frames have named, going around."""
-        if self.last is None:
-            return False
-        if self._first <= self.last:
-            return self._first <= node <= self.last
-        return node >= self._first or node <= self.last
+    def _pass_ages(self) -> None:
+        """Behind CanopyInputs and CanopyArrivals: those that have not come are lost."""
+        self._inputs_left = self._arrivals_left = False
+
+    def tells(self, node: int) -> bool:
+        """Is the code that was told last of this node, if it is known, that of this tick?"""
+        return self.tells_all or node in self.told or any(_spans(run, node) for run in self._runs)
+
+
+def _spans(run: tuple[int, int], node: int) -> bool:
+    """Between two nodes, going around."""
+    first, last = run
+    return first <= node <= last if first <= last else node >= first or node <= last

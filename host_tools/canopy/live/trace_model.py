@@ -35,8 +35,9 @@ TYPES = {
     "float": 1,
     "double": 2,
     "text": 1,
+    "duration": 1,
 }
-"""How many slots a value of a type has."""
+"""How many slots a value of a type has. A duration is in ms."""
 
 
 @dataclass(frozen=True)

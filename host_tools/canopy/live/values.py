@@ -28,6 +28,8 @@ class ValueState:
         """For people, with its unit; "unknown", and a question mark behind what may be another by now."""
         if self.known is None:
             return "unknown"
+        if self.known == "" and self.value.words:
+            return "none" + ("" if self.certain else "?")
         if isinstance(self.known, bool):
             text = "true" if self.known else "false"
         else:
@@ -44,7 +46,7 @@ def meaning(value: TraceValue, texts: tuple[str, ...], slots: tuple[int, ...]) -
         return number if math.isfinite(number) else str(number)
     if value.type == "text":
         return texts[bits] if bits < len(texts) else f"text {bits}"
-    whole = bits - (1 << width) if not value.type.startswith("u") and bits >> (width - 1) else bits
+    whole = bits - (1 << width) if value.type.startswith("int") and bits >> (width - 1) else bits
     if whole in value.words:
         return value.words[whole]
     if value.type == "bool":
@@ -71,9 +73,13 @@ class Slots:
         self._told.clear()
         self._more = False
 
-    def is_slot(self, slot: int) -> bool:
+    def has(self, slot: int) -> bool:
         """Is there a slot of this number?"""
         return slot < len(self._bits)
+
+    def was_told(self, slot: int) -> bool:
+        """In the tick at hand."""
+        return slot in self._told
 
     def take(self, slot: int, bits: int, more: bool) -> None:
         """What a CanopyValue of the tick at hand says."""
@@ -91,19 +97,20 @@ class Slots:
         self._told.clear()
 
     def end(self, complete: bool) -> tuple[ValueState, ...]:
-        """The values at the end of a tick.
+        """The values when a tick is over.
 
         Args:
             complete: All CanopyValue that were announced have come.
         """
+        all_told = complete and not self._more
+        states = tuple(self._state(value, all_told) for value in self._trace.values)
         if not complete:
             self._bits = [bits if slot in self._told else None for slot, bits in enumerate(self._bits)]
-        return tuple(self._state(value) for value in self._trace.values)
+        return states
 
-    def _state(self, value: TraceValue) -> ValueState:
+    def _state(self, value: TraceValue, all_told: bool) -> ValueState:
         slots = range(value.slot, value.slot + value.slots)
         bits = tuple(known for slot in slots if (known := self._bits[slot]) is not None)
         if len(bits) < value.slots:
             return ValueState(value, None, False)
-        certain = not self._more or self._told.issuperset(slots)
-        return ValueState(value, meaning(value, self._trace.texts, bits), certain)
+        return ValueState(value, meaning(value, self._trace.texts, bits), all_told or self._told.issuperset(slots))
