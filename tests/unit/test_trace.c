@@ -405,6 +405,21 @@ static void values_that_do_not_change_are_told_slowly(void)
     }
 }
 
+static void a_value_whose_turn_it_is_comes_once_though_it_has_changed(void)
+{
+    trace_values(3, 2);
+    values.byte = 5;
+    values.word = 6;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(2, count_of(CANOPY_TRACE_VALUE));
+    values.byte = 7; /* slot 1's turn */
+    values.word = 8;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(2, count_of(CANOPY_TRACE_VALUE));
+    expect_value(0, 1, 7);
+    expect_value(1, 4, 8);
+}
+
 /* --- CanopyHealth --------------------------------------------------------------------------------------------------- */
 
 static void health_has_five_pages_in_turn(void)
@@ -493,6 +508,7 @@ int main(void)
     RUN_TEST(values_are_told_when_they_change);
     RUN_TEST(values_that_do_not_fit_come_in_turn);
     RUN_TEST(values_that_do_not_change_are_told_slowly);
+    RUN_TEST(a_value_whose_turn_it_is_comes_once_though_it_has_changed);
     RUN_TEST(health_has_five_pages_in_turn);
     RUN_TEST(health_stops_at_its_largest_values_and_tells_of_a_filter);
     return UNITY_END();

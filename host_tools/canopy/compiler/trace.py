@@ -234,6 +234,12 @@ def _check_ids(bus: Bus, base: int, extended: bool) -> None:
             )
 
 
+def known_within_ms(period_ms: int, nodes: int, snapshot_every: int, slots: int, values_every: int) -> int:
+    """How long a receiver takes until it knows everything again, at most [ms]."""
+    parts = -(-nodes // SNAPSHOT_NODES)
+    return period_ms * max(snapshot_every * (parts + 1), values_every * (slots + 1) if slots else 0)
+
+
 def make_trace(table: Table, bus: Bus, period_ms: int, options: TraceOptions) -> Trace:
     """The trace's configuration.
 
@@ -263,7 +269,7 @@ def make_trace(table: Table, bus: Bus, period_ms: int, options: TraceOptions) ->
         values_every=values_every,
         health_every=_every(HEALTH_MS, period_ms),
         model_every=_every(MODEL_MS, period_ms),
-        known_within_ms=period_ms * max(snapshot_every * (parts + 1), values_every * (slots + 1) if slots else 0),
+        known_within_ms=known_within_ms(period_ms, len(table.rows), snapshot_every, slots, values_every),
         values=values,
         texts=table.bindings.texts,
         nodes=len(table.rows),
