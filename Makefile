@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage figures golden fuzz proof test-portable
+.PHONY: coverage figures golden fuzz proof test-logic test-portable
 .NOTPARALLEL:
 
 help: ## list the targets

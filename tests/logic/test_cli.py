@@ -72,6 +72,32 @@ def test_a_name_that_two_nodes_have(tmp_path: Path) -> None:
     assert "give the path of one" in result.output
 
 
+def test_a_node_with_attributes_has_the_statuses_that_its_parent_sees(tmp_path: Path) -> None:
+    body = '<Sequence><Act name="a" _skipIf="x == 1"/><Do/></Sequence>'
+    skipped = asked(tmp_path, body, "--never", "SKIPPED(a)")
+    assert skipped.output.startswith("unknown")  # the script may say so, or not
+    assert skipped.output.endswith("T/Do FAILURE: the tree is FAILURE\n")
+    for formula in (
+        "SKIPPED(a) and TICKED(a)",
+        "SUCCESS(a) and not TICKED(a)",
+        "HALTED(a) and not once(RUNNING(a), 1)",
+    ):
+        assert asked(tmp_path, body, "--never", formula).output.startswith("proven")
+    assert asked(tmp_path, body, "--always", "TICKED(a) or SKIPPED(a) or TICKED(Do)").output.startswith("proven")
+
+
+@pytest.mark.parametrize(
+    "kind", ["Parallel", 'Parallel success_count="300"', "ParallelAll", 'ReactiveParallel success_count="2"']
+)
+def test_a_node_with_too_many_children_to_count(tmp_path: Path, kind: str) -> None:
+    element = kind.split()[0]
+    for count, verdict in ((500, "refuted"), (501, "unknown")):
+        body = f"<{kind}>" + "<Act/>" * count + f"</{element}>"
+        result = asked(tmp_path, body, "--never", "RUNNING(root)")
+        assert result.output.startswith(verdict)
+    assert f"<{element}> with more than 500 children is not modelled" in result.output
+
+
 def test_timers_are_exact_with_a_period(tmp_path: Path) -> None:
     body = '<Sleep name="wait" msec="120"/>'
     early = "SUCCESS(wait) and not previous(previous(previous(TICKED(wait))))"
@@ -99,6 +125,8 @@ def test_json(tmp_path: Path) -> None:
     (answer,) = json.loads(asked(tmp_path, BODY, "--never", "RUNNING(first)", "--json").output)
     assert answer["verdict"] == "refuted"
     assert answer["trace"][-1]["statuses"]["T/first"] == "RUNNING"
+    (answer,) = json.loads(asked(tmp_path, BODY, "--never", "HALTED(first)", "--json").output)
+    assert [one["halted"] for one in answer["trace"]] == [[], ["T/Sequence", "T/first"]]
 
 
 def test_without_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -161,7 +161,11 @@ def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json
 @click.option("--claim", "names", multiple=True, metavar="NAME", help="Only this claim; may be given several times.")
 @click.option("--solver", multiple=True, type=click.Choice(SOLVERS), help="Have a solver check the proofs again.")
 @click.option(
-    "--timeout", default=60.0, show_default=True, type=click.FloatRange(0.1, 86_400), help="Seconds per claim."
+    "--timeout",
+    default=60.0,
+    show_default=True,
+    type=click.FloatRange(0.1, 86_400),
+    help="Seconds per claim or question.",
 )
 @click.option("--certificate", "folder", type=click.Path(path_type=Path), help="Write certificates to this folder.")
 @click.option("--check", "checked_folder", type=click.Path(path_type=Path), help="Only check a folder's certificates.")
@@ -205,8 +209,8 @@ def command(
     --never and --always need no model: they ask about the statuses of nodes, now and in the past, for any answers that
     the leaves declare. They need the program berkeley-abc.
 
-    Exit status: 0 all came out as the model file expects, 1 one did not, a solver disagrees, or a certificate is
-    rejected, 2 wrong input.
+    Exit status: 0 all came out as the model file expects, and all questions are proven, 1 one did not, a solver
+    disagrees, or a certificate is rejected, 2 wrong input.
 
     \b
     Examples:

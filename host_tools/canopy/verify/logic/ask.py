@@ -52,7 +52,10 @@ def decided(
     replay = Replay(root, period_us)
     trace = [replay.tick(one) for one in inputs]
     if trace != expected or holds(formula, trace)[-1]:
-        raise DisagreementError("the trace that refutes the formula does not happen in the reference model")
+        raise DisagreementError(
+            "the trace that refutes the formula does not happen in the reference model",
+            "this is a fault of canopy verify: please report it, with the tree and the formula",
+        )
     return Verdict("refuted", "", time.perf_counter() - begin, tuple(inputs), tuple(map(tuple, trace)))
 
 

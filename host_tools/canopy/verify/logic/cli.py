@@ -65,6 +65,7 @@ def _as_json(tree: LogicTree, question: str, verdict: Verdict) -> dict[str, Any]
             {
                 "answers": dict(called(tree, inputs, moments)),
                 "statuses": {path: STATUS_NAMES[one.code] for path, one in zip(paths, moments, strict=True)},
+                "halted": [path for path, one in zip(paths, moments, strict=True) if one.halted],
             }
             for inputs, moments in zip(verdict.inputs, verdict.trace, strict=True)
         ],

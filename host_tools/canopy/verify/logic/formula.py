@@ -38,6 +38,8 @@ OPERATORS = {
 CONNECTIVES = ("implies", "or", "and", "not")
 KNOWN = (*ATOMS, *OPERATORS, *CONNECTIVES, "true", "false")
 
+Named = Callable[[str, str, int], int]
+
 _TOKEN = re.compile(r'\s*(?:(?P<word>[\w/]+)|"(?P<quoted>[^"]*)"|(?P<sign>[(),]))')
 
 
@@ -74,7 +76,7 @@ def _split(text: str) -> list[_Token]:
 
 
 class _Parser:
-    def __init__(self, text: str, node: Callable[[str, int], int]) -> None:
+    def __init__(self, text: str, node: Named) -> None:
         if len(text) > MAX_LENGTH:
             raise ExpressionError(0, f"the formula is longer than {MAX_LENGTH} characters")
         self._tokens = [*_split(text), _Token("end", "", len(text))]
@@ -147,7 +149,7 @@ class _Parser:
         name = self._take()
         if name.kind not in ("word", "quoted"):
             raise ExpressionError(name.at, f"expected a node's name, not {_shown(name)}")
-        number = self._node(name.text, name.at)
+        number = self._node(token.text, name.text, name.at)
         if self._tokens[0].kind == "word":
             raise ExpressionError(
                 self._tokens[0].at, f"expected ')', not {_shown(self._tokens[0])}", 'quote names with blanks: "Go home"'
@@ -177,8 +179,8 @@ def _shown(token: _Token) -> str:
     return "the end" if token.kind == "end" else f"'{token.text}'"
 
 
-def parse(text: str, node: Callable[[str, int], int]) -> Formula:
-    """Reads a formula. `node` gives the number of a node from its name, and the name's place in the text.
+def parse(text: str, node: Named) -> Formula:
+    """Reads a formula. `node` gives the number of a node from the atom, the node's name, and the name's place.
 
     Raises:
         ExpressionError: It is not one; says at which character.

@@ -16,7 +16,11 @@ from canopy.verify.logic.encode import CELLS
 
 MAX_DEPTH = 200
 """Levels; the circuits are made recursively."""
+MAX_COUNTED = 500
+"""Children of a node that counts them; its circuit has some gates for each pair of them."""
 ROOT = "root"
+OF_THE_NODE_ITSELF = ("TICKED", "HALTED")
+"""What a node's attributes do not take part in."""
 _STATUS_OF = {name: number for number, name in NUMBERS.items()}
 _SCRIPT_LEAVES = ("Script", "ScriptCondition", "SetBlackboard", "UnsetBlackboard")
 _SCRIPTED = ("SkipUnlessUpdated", "WaitValueUpdate", "WasEntryUpdated", "Switch")
@@ -50,6 +54,8 @@ def _problem(node: Node, level: int) -> str:
         return f"it lies deeper than {MAX_DEPTH} levels"
     if kind not in CELLS:
         return f"<{node.xml_name or kind}> is not modelled"
+    if kind in ("Parallel", "ParallelAll", "ReactiveParallel") and len(node.children) > MAX_COUNTED:
+        return f"<{kind}> with more than {MAX_COUNTED} children is not modelled"
     if kind == "TryCatch" and node.parameters[0] != 0:
         return 'catch_on_halt="true" is not modelled'
     if any(isinstance(value, Script) for value in _numbers(node, kind)):
@@ -111,14 +117,22 @@ class LogicTree:
         parameters = tuple(value for value in numbers if isinstance(value, int))
         return Spec(kind, [self._spec(child) for child in node.children], parameters, b"", _scripts(node, kind))
 
-    def number(self, name: str, at: int) -> int:
-        """The node with a name or a path.
+    def number(self, what: str, name: str, at: int) -> int:
+        """The node with a name or a path, for an atom.
+
+        What is written as attributes of a node is a node above it, Attributes. It has the statuses that the named node
+        has for its parent; ticked and halted is the named node itself.
 
         Raises:
             ExpressionError: There is none, or more than one.
         """
+        found = self._named(name, at)
+        above = self.nodes[found - 1] if found > 0 else None
+        has_attributes = above is not None and kind_of(above) == "Attributes" and above.place == self.nodes[found].place
+        return found - 1 if has_attributes and what not in OF_THE_NODE_ITSELF else found
+
+    def _named(self, name: str, at: int) -> int:
         found = self._by_name.get(name, [])
-        # What is written as attributes has a node of its own above the named one: the named one is meant.
         named = [number for number in found if kind_of(self.nodes[number]) != "Attributes"] or found
         exact = [number for number in named if self.nodes[number].path.lstrip("/") == name.lstrip("/")] or named
         if not exact:
