@@ -46,6 +46,8 @@ class _Writer:
 def document(body: str) -> str:
     """A tree file with the leaves that are declared here."""
     models = '<Condition ID="Check"/><Action ID="Act"/><Action ID="Do"/>'
+    told = '<input_port name="speed"/><MetadataFields><Metadata returns="SUCCESS"/></MetadataFields>'
+    models += f'<Action ID="Told">{told}</Action>'
     return (
         f'<root BTCPP_format="4"><BehaviorTree ID="T">{body}</BehaviorTree>'
         f"<TreeNodesModel>{models}</TreeNodesModel></root>\n"

@@ -87,6 +87,25 @@ def test_a_node_with_attributes_has_the_statuses_that_its_parent_sees(tmp_path: 
 
 
 @pytest.mark.parametrize(
+    "node",
+    [
+        '<Script code="x := Climate.Temperature"/>',
+        '<Script code="x := 1; Fan.Speed := x; y := x + Climate.Temperature"/>',
+        '<Told speed="{Climate.Temperature}"/>',
+        '<SetBlackboard value="{Climate.Temperature}" output_key="x"/>',
+    ],
+)
+def test_a_script_fails_while_a_signal_that_it_reads_is_stale(tmp_path: Path, node: str) -> None:
+    assert not asked(tmp_path, node, "--never", "FAILURE(root)").output.startswith("proven")
+    for other in (
+        '<Script code="x := 1; Fan.Speed := x"/>',
+        '<Told speed="{x}"/>',
+        '<SetBlackboard value="1" output_key="x"/>',
+    ):
+        assert asked(tmp_path, other, "--never", "FAILURE(root)").output.startswith("proven")
+
+
+@pytest.mark.parametrize(
     "kind", ["Parallel", 'Parallel success_count="300"', "ParallelAll", 'ReactiveParallel success_count="2"']
 )
 def test_a_node_with_too_many_children_to_count(tmp_path: Path, kind: str) -> None:

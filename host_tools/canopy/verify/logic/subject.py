@@ -7,7 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from canopy.check.status_sets import NUMBERS, leaf_statuses
+from canopy.compiler.blackboard import SignalName
 from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.script.syntax import Assignment, Name, ScriptError, parse, parts
+from canopy.compiler.script_bodies import entry_value
 from canopy.compiler.tree import Node, Script, Tree
 from canopy.semantics.spec import Script as ModelScript
 from canopy.semantics.spec import Spec
@@ -64,8 +67,29 @@ def _problem(node: Node, level: int) -> str:
 
 
 def kind_of(node: Node) -> str:
-    """The node's kind, as canopy.semantics calls it."""
-    return node.xml_name if node.xml_name in _SCRIPT_LEAVES else node.type.name
+    """The node's kind, as canopy.semantics calls it.
+
+    A Script that reads a signal fails while that is stale, else it succeeds: that is what a ScriptCondition may answer.
+    """
+    if node.xml_name not in _SCRIPT_LEAVES:
+        return node.type.name
+    return "ScriptCondition" if node.script is not None and _reads_signals(node.script) else node.xml_name
+
+
+def _reads_signals(script: Script) -> bool:
+    """Does what the script is depend on a message that may be stale?"""
+    if script.role == "unset":
+        return False
+    if script.role == "set":
+        return isinstance(entry_value(script), SignalName)
+    try:
+        statements = parse(script.text)
+    except ScriptError as error:
+        raise CompileError(script.place(error.index), error.message, error.help_text) from error
+    read = [part for statement in statements for part in parts(statement) if isinstance(part, Name)]
+    written = [statement.target for statement in statements if isinstance(statement, Assignment)]
+    names = [part.name for part in read if not any(part is target for target in written)]
+    return any(isinstance(script.scope.resolve(name, script.place()), SignalName) for name in names)
 
 
 def _numbers(node: Node, kind: str) -> tuple[int | Script, ...]:
