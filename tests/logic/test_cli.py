@@ -117,6 +117,13 @@ def test_a_node_with_too_many_children_to_count(tmp_path: Path, kind: str) -> No
     assert f"<{element}> with more than 500 children is not modelled" in result.output
 
 
+def test_entries_are_set_and_unset(tmp_path: Path) -> None:
+    body = '<Sequence><SetBlackboard value="1" output_key="x"/><UnsetBlackboard key="x"/><Act name="a"/></Sequence>'
+    result = asked(tmp_path, body, "--never", "FAILURE(UnsetBlackboard) or FAILURE(SetBlackboard) or RUNNING(a)")
+    assert result.output.startswith("refuted")
+    assert result.output.endswith("T/a RUNNING: the tree is RUNNING\n")
+
+
 def test_timers_are_exact_with_a_period(tmp_path: Path) -> None:
     body = '<Sleep name="wait" msec="120"/>'
     early = "SUCCESS(wait) and not previous(previous(previous(TICKED(wait))))"

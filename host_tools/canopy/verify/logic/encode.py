@@ -20,7 +20,6 @@ CELLS: dict[str, type[Cell]] = {
     "Sleep": cells.Sleep,
     "Script": cells.Constant,
     "SetBlackboard": cells.Constant,
-    "UnsetBlackboard": cells.Constant,
     "ScriptCondition": cells.Asked,
     "WasEntryUpdated": cells.Asked,
     "Sequence": control.InOrder,

@@ -73,7 +73,8 @@ def kind_of(node: Node) -> str:
     """
     if node.xml_name not in _SCRIPT_LEAVES:
         return node.type.name
-    return "ScriptCondition" if node.script is not None and _reads_signals(node.script) else node.xml_name
+    fails = node.xml_name == "ScriptCondition" or (node.script is not None and _reads_signals(node.script))
+    return "ScriptCondition" if fails else "Script"
 
 
 def _reads_signals(script: Script) -> bool:
