@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage figures golden fuzz proof test-portable
+.PHONY: coverage figures golden fuzz proof test-logic test-portable
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -44,7 +44,7 @@ test-firmware: # the same tests as firmware in QEMU, and the sizes of the code f
 	cmake --build --preset firmware-m4 --target sizes
 
 test-python: # Python and integration tests that need no CAN interface
-	$(PYTEST) -m "not rig and not clang"
+	$(PYTEST) -m "not rig and not clang and not logic"
 
 test-rig: # integration tests on vcan0: one guest for all of them
 	$(PYTHON) tests/rig/with-vcan --timeout 1800 --mem 1G -- $(PYTEST) -m rig
@@ -70,7 +70,7 @@ format: ## let clang-format and ruff rewrite the sources
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,plot,test,verify,differential
-	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-portable coverage test-differential test-asan fuzz
+	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-logic test-portable coverage test-differential test-asan fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
 	$(call BUILD,clang)
@@ -92,10 +92,15 @@ test-differential: # 20,000 random trees against the model and BehaviorTree.CPP,
 	$(call BUILD,host)
 	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
 
+test-logic: # canopy verify --never and --always: circuits, and what berkeley-abc says of them
+	$(SETUP)/ensure-packages logic
+	$(SETUP)/make-venv can,lcm,test,verify,differential
+	$(PYTEST) -m logic tests/logic
+
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
-	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang" tests/integration tests/differential
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang and not logic" tests/integration tests/differential
 
 fuzz: ## libFuzzer on tables, images, states, frames and traces; then hostile files to C to the machine: FUZZ_SECONDS=60 each
 	$(SETUP)/ensure-packages fuzz
