@@ -18,7 +18,7 @@ from rich.tree import Tree
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo, styled
 from canopy.live.codes import NOTHING_KNOWN, NodeState, last_result, was_ticked
-from canopy.live.health import Health
+from canopy.live.words import health_words
 from canopy.model import Node
 from canopy.trace import Status, TreeView
 from canopy.watch import Watch
@@ -176,33 +176,8 @@ def _losses(view: TreeView) -> str:
         text += f" ({view.crc_errors} of them CanopyTick with a wrong CRC)"
     if view.restarts:
         text += f", {view.restarts} restarts"
-    health = _health(view.health)
+    health = health_words(view.health)
     return text + (f"; controller: {health}" if health else "")
-
-
-def _health(health: Health) -> str:
-    """What it has counted, as far as it has been told; without most of what is as it should be."""
-    unknown = "unknown filtered" if health.rx_filtered else f"{health.rx_unknown} unknown"
-    parts = [f"{health.rx_rejected} refused", unknown] if health.rx_rejected is not None else []
-    if health.longest_cycle_us is not None:
-        parts.append(f"longest cycle {health.longest_cycle_us / 1000:.3f} ms")
-    if health.latest_start_us is not None:
-        parts.append(f"latest {health.latest_start_us / 1000:.2f} ms")
-    for count, what in (
-        (health.rx_lost, "lost by the driver"),
-        (health.rx_backlogs, "backlogs"),
-        (health.rx_errors, "receive errors"),
-        (health.timeouts, "timeouts"),
-        (health.tx_replaced, "replaced"),
-        (health.tx_expired, "expired"),
-        (health.trace_dropped, "trace frames dropped"),
-        (health.bus_restarts, "restarts of the bus"),
-        (health.slips, "cycles left out"),
-        (health.leaf_faults, "leaf faults"),
-    ):
-        if count:
-            parts.append(f"{count} {what}")
-    return ", ".join(parts)
 
 
 def _bus(view: TreeView) -> str:

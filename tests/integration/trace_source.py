@@ -148,7 +148,7 @@ VALUES: list[dict[str, Any]] = [
         "type": "uint8_t",
         "slot": 4,
         "slots": 1,
-        "enum": {"dark": 1},
+        "enum": {"": 0, "dark": 1},
     },
     {"kind": "entry", "name": "word", "path": "", "type": "text", "slot": 5, "slots": 1},
     {"kind": "entry", "name": "exact", "path": "", "type": "double", "slot": 6, "slots": 2},
