@@ -15,12 +15,19 @@ static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t det
     }
 }
 
+static bool has_memory_for_trace(const canopy_app_t *app)
+{
+    return app->trace == NULL ||
+           (app->trace_state != NULL && app->sent != NULL && app->nodes_max >= app->tree->node_count &&
+            (app->told != NULL || app->trace->value_count == 0u));
+}
+
 static bool is_complete(const canopy_loop_config_t *config)
 {
     const canopy_app_t *app = config->app;
 
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
-           (app->trace == NULL || app->trace_state != NULL) && app->bus_state != NULL && app->input != NULL &&
+           app->bus_state != NULL && app->input != NULL &&
            app->output != NULL && (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL &&
            app->rx_max > 0u && app->frame_us > 0u;
 }
@@ -43,6 +50,9 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
     }
     app = config->app;
     error = canopy_tree_init(app->tree_instance, app->tree, app->status, app->words, app->memory);
+    if (error == CANOPY_OK && !has_memory_for_trace(app)) {
+        error = CANOPY_ERROR_ARGUMENT;
+    }
     if (error == CANOPY_OK) {
         error = canopy_tx_init(app->tx, app->bus->tx, app->bus->tx_count, &app->tx_memory, config->can);
     }

@@ -10,6 +10,7 @@
 enum { HAS_SNAPSHOT = 0x40, HAS_CHANGES = 0x80 };           /* of CanopyTick's byte 6 */
 enum { OVERLOAD = 0x08, RETURNING = 0x10, MANY = 0x80 };    /* of CanopyInputs' byte 5 */
 enum { AGES_AT = 5, AGES_IN_INPUTS = 2, AGES_AND_MORE = 3 }; /* bits 5 and 6 there */
+enum { ANNOUNCEMENTS = 3 }; /* of another tree: in so many ticks */
 enum { AGES_IN_FRAME = 7, LAST = 0x80, LONG_AGE = 255, MANY_FRAMES = 256 };
 
 static void send_tick(const canopy_trace_sink_t *sink, const canopy_trace_tick_t *tick, unsigned flags, uint8_t values)
@@ -143,6 +144,10 @@ static void send_slow(const canopy_trace_sink_t *sink, canopy_time_t now)
     uint32_t upper = (uint32_t)((now >> 24) & 0xFFFFFFu);
     bool is_due = canopy_trace_is_due(&state->model_in, sink->config->model_every);
 
+    if (state->announcements > 0u) {
+        state->announcements--;
+        is_due = true;
+    }
     if (is_due) {
         send_model(sink);
     }
@@ -202,5 +207,5 @@ void canopy_trace_follow_exchange(canopy_trace_state_t *self)
     self->next_node = 0;
     self->next_shown = 0;
     self->snapshot_in = 0;
-    self->model_in = 0;
+    self->announcements = (uint8_t)ANNOUNCEMENTS;
 }

@@ -7,7 +7,6 @@
  * a node that it does not tick differs from one that it ticks with the same result.
  */
 #include <stddef.h>
-#include <string.h>
 
 #include "trace_parts.h"
 
@@ -16,19 +15,6 @@ enum { SKIP = 15, SKIP_BLOCKS_MAX = 14, TICK_AT = 4 };
 enum { MORE_FOLLOW = 0x00, LAST = 0x40, LAST_AND_WAITING = 0x80 };
 
 #define OLD_WORD (CANOPY_STATUS_OLD * UINT32_C(0x01010101))
-
-static uint32_t load_word(const uint8_t *bytes)
-{
-    uint32_t word;
-
-    memcpy(&word, bytes, sizeof word);
-    return word;
-}
-
-static void store_word(uint8_t *bytes, uint32_t word)
-{
-    memcpy(bytes, &word, sizeof word);
-}
 
 /** Is this node's code another than the one told last? Where only bytes differ that have one code, they count as told. */
 static bool has_changed(canopy_trace_state_t *state, const canopy_tree_instance_t *tree, uint16_t node)
@@ -45,24 +31,36 @@ static bool has_changed(canopy_trace_state_t *state, const canopy_tree_instance_
     return false;
 }
 
+/** Marks the words of nodes that are as told, from `node` on, a whole number of words. @return the node after them */
+static uint32_t mark_words(const canopy_trace_state_t *state, const canopy_tree_instance_t *tree, uint32_t node,
+                           uint32_t to)
+{
+    uint32_t *status = (uint32_t *)(void *)tree->status; /* they are declared as words: canopy_app_t.status */
+    const uint32_t *sent = (const uint32_t *)(const void *)state->sent;
+    uint32_t word = node / (uint32_t)WORD;
+    const uint32_t end = to / (uint32_t)WORD;
+
+    while (word < end && status[word] == sent[word]) {
+        status[word] |= OLD_WORD;
+        word++;
+    }
+    return word * (uint32_t)WORD;
+}
+
 /** The first node in [from, to) that has changed, or `to`. Marks those before it. */
 static uint16_t next_change(canopy_trace_state_t *state, const canopy_tree_instance_t *tree, uint16_t from, uint16_t to)
 {
-    uint8_t *status = tree->status;
     uint32_t node = from;
 
     while (node < to) {
-        uint32_t word = node + (uint32_t)WORD <= to ? load_word(&status[node]) : 0u;
-
-        if (node + (uint32_t)WORD <= to && word == load_word(&state->sent[node])) {
-            store_word(&status[node], word | OLD_WORD);
-            node += (uint32_t)WORD;
-        } else if (!has_changed(state, tree, (uint16_t)node)) {
-            status[node] |= (uint8_t)CANOPY_STATUS_OLD;
-            node++;
-        } else {
+        if (node % (uint32_t)WORD == 0u) {
+            node = mark_words(state, tree, node, to);
+        }
+        if (node >= to || has_changed(state, tree, (uint16_t)node)) {
             break;
         }
+        tree->status[node] |= (uint8_t)CANOPY_STATUS_OLD;
+        node++;
     }
     return (uint16_t)node;
 }

@@ -5,41 +5,46 @@
 
 #include "trace_parts.h"
 
-static uint32_t extended(uint32_t value, unsigned bits, bool is_signed)
+/** A value that is not a whole number of 32 bits. By its own type, or, of floating point, byte by byte. */
+static uint32_t read_other(const canopy_trace_value_t *value, const void *from)
 {
-    uint32_t sign = UINT32_C(1) << (bits - 1u);
-
-    return is_signed ? (value ^ sign) - sign : value;
-}
-
-/** The value as the trace tells it. */
-static uint32_t read(const canopy_trace_value_t *value, const void *memory)
-{
-    const uint8_t *from = (const uint8_t *)memory + value->offset;
-    uint8_t byte;
-    uint16_t half;
     uint32_t word;
     uint64_t whole;
 
-    switch (value->size) {
-    case sizeof byte:
-        memcpy(&byte, from, sizeof byte);
-        return extended(byte, 8, value->is_signed);
-    case sizeof half:
-        memcpy(&half, from, sizeof half);
-        return extended(half, 16, value->is_signed);
-    case sizeof word:
+    switch ((canopy_trace_kind_t)value->kind) { /* not covered: no other value */
+    case CANOPY_TRACE_U8:
+        return *(const uint8_t *)from;
+    case CANOPY_TRACE_I8:
+        return (uint32_t) * (const int8_t *)from;
+    case CANOPY_TRACE_U16:
+        return *(const uint16_t *)from;
+    case CANOPY_TRACE_I16:
+        return (uint32_t) * (const int16_t *)from;
+    case CANOPY_TRACE_LOW:
+        return (uint32_t)(*(const uint64_t *)from & UINT32_MAX);
+    case CANOPY_TRACE_HIGH:
+        return (uint32_t)(*(const uint64_t *)from >> 32);
+    case CANOPY_TRACE_FLOAT:
         memcpy(&word, from, sizeof word);
         return word;
-    default:
+    case CANOPY_TRACE_DOUBLE_LOW:
         memcpy(&whole, from, sizeof whole);
-        return (uint32_t)((value->is_high ? whole >> 32 : whole) & UINT32_MAX);
+        return (uint32_t)(whole & UINT32_MAX);
+    case CANOPY_TRACE_DOUBLE_HIGH:
+        memcpy(&whole, from, sizeof whole);
+        return (uint32_t)(whole >> 32);
+    case CANOPY_TRACE_WORD: /* not covered: not here */
+        break;
     }
+    return 0; /* not covered: no other value */
 }
 
-static uint16_t after(uint16_t slot, uint16_t count)
+/** The value as the trace tells it. */
+static inline uint32_t read(const canopy_trace_value_t *value, const void *memory)
 {
-    return slot + 1u < count ? (uint16_t)(slot + 1u) : 0u;
+    const void *from = (const uint8_t *)memory + value->offset;
+
+    return value->kind == (uint8_t)CANOPY_TRACE_WORD ? *(const uint32_t *)from : read_other(value, from);
 }
 
 static void choose(canopy_trace_choice_t *choice, uint16_t slot)
@@ -48,28 +53,40 @@ static void choose(canopy_trace_choice_t *choice, uint16_t slot)
     choice->count++;
 }
 
+/** Chooses the changed values in [from, to). @return the first one for which there is no room, or `to` */
+static uint16_t choose_changed(const canopy_trace_config_t *config, const canopy_trace_state_t *state, const void *memory,
+                               canopy_trace_choice_t *choice, uint16_t from, uint16_t to)
+{
+    const uint32_t *told = state->told;
+    const canopy_trace_value_t *values = config->values;
+
+    for (uint16_t slot = from; slot < to; slot++) {
+        if (read(&values[slot], memory) == told[slot] || (choice->count > 0u && slot == choice->slot[0])) {
+            continue;
+        }
+        if (choice->count == config->values_max) {
+            choice->waiting = true;
+            return slot;
+        }
+        choose(choice, slot);
+    }
+    return to;
+}
+
 void canopy_trace_choose(const canopy_trace_config_t *config, canopy_trace_state_t *state, const void *memory,
                          canopy_trace_choice_t *choice)
 {
-    uint16_t refreshed = UINT16_MAX;
-    uint16_t slot = state->next_value;
+    uint16_t count = config->value_count;
+    uint16_t start = state->next_value;
 
     if (canopy_trace_is_due(&state->value_in, config->values_every)) {
-        refreshed = state->next_refresh;
-        state->next_refresh = after(refreshed, config->value_count);
-        choose(choice, refreshed);
+        choose(choice, state->next_refresh);
+        state->next_refresh = state->next_refresh + 1u < count ? (uint16_t)(state->next_refresh + 1u) : 0u;
     }
-    for (uint16_t seen = 0; seen < config->value_count; seen++) {
-        if (slot != refreshed && read(&config->values[slot], memory) != state->told[slot]) {
-            if (choice->count == config->values_max) {
-                choice->waiting = true;
-                break;
-            }
-            choose(choice, slot);
-        }
-        slot = after(slot, config->value_count);
+    state->next_value = choose_changed(config, state, memory, choice, start, count);
+    if (!choice->waiting) {
+        state->next_value = choose_changed(config, state, memory, choice, 0, start);
     }
-    state->next_value = slot;
 }
 
 void canopy_trace_values(const canopy_trace_sink_t *sink, const void *memory, const canopy_trace_choice_t *choice)

@@ -18,7 +18,7 @@ PARTS = {
     "begin": ("canopy_bus_begin_tick",),
     "tick": ("canopy_tree_tick",),
     "commit": ("canopy_bus_commit",),
-    "trace": ("canopy_trace_send",),
+    "trace": ("canopy_trace_send", "canopy_trace_health"),
     "transmit": ("canopy_tx_service",),
     # In receive and transmit, and there a second time.
     "e2e": ("canopy_e2e_check", "canopy_e2e_protect"),
@@ -90,7 +90,7 @@ def generate(application: Application, folder: Path) -> Path:
     """The application in C, and frames.c; returns the folder with all that."""
     out = folder / application.name
     tree, dbc = application.folder / "trees" / application.tree, application.folder / application.dbc
-    options = ("--node", "Controller", "--period-ms", "50", "--name", application.name, *application.options)
+    options = ("--node", "Controller", "--period-ms", "50", "--trace", "0x600", "--name", application.name, *application.options)
     build.run(*image.CANOPY, "compile", tree, "--dbc", dbc, *options, "-o", out)
     (out / "frames.c").write_text(_frames(application), encoding="utf-8")
     return out

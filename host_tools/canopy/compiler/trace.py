@@ -32,8 +32,17 @@ AGES_IN_INPUTS = 2
 AGES_IN_FRAME = 7
 HEALTH_PAGES = 5
 
-_BYTES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
-_BYTES |= {"int64_t": 8, "uint64_t": 8, "float": 4, "double": 8}
+_KINDS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("int32_t", "uint32_t"), ("WORD",)),
+    **dict.fromkeys(("bool", "uint8_t"), ("U8",)),
+    "int8_t": ("I8",),
+    "uint16_t": ("U16",),
+    "int16_t": ("I16",),
+    **dict.fromkeys(("int64_t", "uint64_t"), ("LOW", "HIGH")),
+    "float": ("FLOAT",),
+    "double": ("DOUBLE_LOW", "DOUBLE_HIGH"),
+}
+"""C type -> canopy_trace_kind_t of each of its slots."""
 
 Entries = Literal["all", "marked", "none"]
 
@@ -59,8 +68,7 @@ class TracedValue:
     type: str
     member: str
     slot: int
-    bytes: int
-    is_signed: bool
+    kinds: tuple[str, ...]
     scale: str = ""
     names: tuple[str, ...] = ()
     """Of the numbers 0, 1, …, where they have names."""
@@ -68,7 +76,7 @@ class TracedValue:
     @property
     def slots(self) -> int:
         """How many it takes."""
-        return 2 if self.bytes == 8 else 1
+        return len(self.kinds)
 
     def as_dict(self) -> dict[str, object]:
         """For the model file."""
@@ -169,8 +177,7 @@ def _entry(entry: Entry, slot: int) -> TracedValue | None:
         type=kind,
         member=mark_c(f"entries.{entry.c_name}"),
         slot=slot,
-        bytes=_BYTES[c_type],
-        is_signed=c_type.startswith("int"),
+        kinds=_KINDS[c_type],
         scale=plain(entry.type.scale) if entry.type.kind == "fixed" else "",
     )
 
@@ -189,8 +196,7 @@ def _reasons(table: Table, slot: int) -> list[TracedValue]:
                     type="uint8_t",
                     member=mark_c(f"reason_of_{use.leaf.c_name}[{number}]"),
                     slot=slot + len(result),
-                    bytes=1,
-                    is_signed=False,
+                    kinds=("U8",),
                     names=("", *use.leaf.reasons),
                 )
             )

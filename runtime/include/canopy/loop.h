@@ -38,7 +38,7 @@ typedef struct {
     void (*start)(
         void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
     canopy_tree_instance_t *tree_instance;
-    uint8_t *status; /**< tree->node_count. */
+    uint8_t *status; /**< tree->node_count; with a trace, of an array of uint32_t. */
     uint16_t *words; /**< tree->word_count. */
     canopy_bus_state_t *bus_state;
     void *input;           /**< The input image. */
@@ -47,7 +47,7 @@ typedef struct {
     canopy_tx_t *tx;       /**< The transmit side: for the driver's transmit interrupt. */
     canopy_tx_memory_t tx_memory;
     canopy_trace_state_t *trace_state; /**< NULL without trace, as the next two. */
-    uint8_t *sent;                     /**< nodes_max. */
+    uint8_t *sent;                     /**< nodes_max; of an array of uint32_t. */
     uint32_t *told;                    /**< trace->value_count, or NULL. */
     uint16_t nodes_max;                /**< Nodes that `status` and `sent` have room for: of the largest tree image. */
 } canopy_app_t;

@@ -44,12 +44,24 @@ typedef enum {
 /** Most CanopyValue frames of a tick. */
 #define CANOPY_TRACE_VALUES_MAX 7u
 
+/** What a traced value is in C. */
+typedef enum {
+    CANOPY_TRACE_WORD, /**< int32_t or uint32_t. */
+    CANOPY_TRACE_U8,   /**< Or bool. */
+    CANOPY_TRACE_I8,
+    CANOPY_TRACE_U16,
+    CANOPY_TRACE_I16,
+    CANOPY_TRACE_LOW, /**< Lower half of an int64_t or uint64_t. */
+    CANOPY_TRACE_HIGH,
+    CANOPY_TRACE_FLOAT,
+    CANOPY_TRACE_DOUBLE_LOW,
+    CANOPY_TRACE_DOUBLE_HIGH
+} canopy_trace_kind_t;
+
 /** Where a traced value of up to 32 bits lies: an entry, a leaf's reason, or half of an entry of 64 bits. Constant. */
 typedef struct {
-    uint32_t offset;  /**< In the application's memory [bytes]. */
-    uint8_t size;     /**< 1, 2, 4 or 8 bytes. */
-    bool is_signed;   /**< 1 or 2 bytes: extended by the sign. */
-    bool is_high;     /**< 8 bytes: the upper half of it. */
+    uint32_t offset; /**< In the application's memory [bytes]. */
+    uint8_t kind;    /**< canopy_trace_kind_t. */
 } canopy_trace_value_t;
 
 /** Constant: made by the compiler from `--trace`. */
@@ -82,6 +94,7 @@ typedef struct {
     uint16_t health_in;
     uint16_t model_in;
     uint8_t health_page;
+    uint8_t announcements; /**< Ticks that tell which tree it is though it is not due. */
     uint8_t sequence;
     uint8_t counter; /**< E2E. */
     bool has_begun;
