@@ -258,7 +258,7 @@ def make_trace(table: Table, bus: Bus, period_ms: int, options: TraceOptions) ->
         extended=extended,
         guard=options.guard,
         changes_max=min(CHANGES_MAX, len(table.rows)),
-        values_max=min(VALUES_MAX, slots + 1) if slots else 0,
+        values_max=VALUES_MAX if slots else 0,
         snapshot_every=snapshot_every,
         values_every=values_every,
         health_every=_every(HEALTH_MS, period_ms),
