@@ -62,24 +62,45 @@ static void make_tables(controller_t *self)
     CHECK(canopy_tree_validate(&self->tree, NULL) == CANOPY_OK);
 }
 
-/** Entries of every size, and their slots. */
+static unsigned bytes_of(canopy_trace_kind_t kind)
+{
+    switch (kind) {
+    case CANOPY_TRACE_U8:
+    case CANOPY_TRACE_I8:
+        return 1;
+    case CANOPY_TRACE_U16:
+    case CANOPY_TRACE_I16:
+        return 2;
+    case CANOPY_TRACE_WORD:
+    case CANOPY_TRACE_FLOAT:
+        return 4;
+    case CANOPY_TRACE_LOW:
+    case CANOPY_TRACE_HIGH:
+    case CANOPY_TRACE_DOUBLE_LOW:
+    case CANOPY_TRACE_DOUBLE_HIGH:
+        break;
+    }
+    return 8;
+}
+
+/** Entries of every type, and their slots. */
 static void make_values(controller_t *self)
 {
+    static const canopy_trace_kind_t kinds[] = {CANOPY_TRACE_WORD, CANOPY_TRACE_U8,        CANOPY_TRACE_I8,
+                                                CANOPY_TRACE_U16,  CANOPY_TRACE_I16,       CANOPY_TRACE_FLOAT,
+                                                CANOPY_TRACE_LOW,  CANOPY_TRACE_DOUBLE_LOW};
+    enum { OF_32_BITS = 6, ALL = sizeof kinds / sizeof kinds[0] };
     uint16_t slots = 0;
     uint16_t most = (uint16_t)random_below(&self->random, SLOTS_MAX);
 
     for (self->entry_count = 0; slots < most; self->entry_count++) {
-        uint8_t size = (uint8_t)(1u << random_below(&self->random, slots + 1u < most ? 4u : 3u));
-        canopy_trace_value_t value = {.offset = (uint32_t)offsetof(controller_t, memory) + 8u * self->entry_count,
-                                      .size = size};
+        canopy_trace_kind_t kind = kinds[random_below(&self->random, slots + 1u < most ? ALL : OF_32_BITS)];
+        uint32_t offset = (uint32_t)offsetof(controller_t, memory) + 8u * self->entry_count;
 
-        value.is_signed = size < 4u && random_chance(&self->random, 500);
-        self->entries[self->entry_count].size = size;
-        self->entries[self->entry_count].is_signed = value.is_signed;
-        self->values[slots++] = value;
-        if (size == 8u) {
-            value.is_high = true;
-            self->values[slots++] = value;
+        self->entries[self->entry_count].kind = kind;
+        self->values[slots++] = (canopy_trace_value_t){.offset = offset, .kind = (uint8_t)kind};
+        if (bytes_of(kind) == 8u) {
+            self->values[slots++] = (canopy_trace_value_t){.offset = offset, .kind = (uint8_t)(kind + 1)};
         }
     }
     self->config.value_count = slots;
@@ -168,44 +189,49 @@ static void answer(controller_t *self)
     }
 }
 
-/** Values change, in memory as C has them, and in the truth as docs/trace.md has them. */
+/** A value in memory, as C has it. */
+static void store(uint8_t *place, canopy_trace_kind_t kind, uint64_t value)
+{
+    switch (bytes_of(kind)) { /* of an object of that size: the order of the bytes is the machine's */
+    case 1:
+        *place = (uint8_t)value;
+        break;
+    case 2:
+        memcpy(place, &(uint16_t){(uint16_t)value}, sizeof(uint16_t));
+        break;
+    case 4:
+        memcpy(place, &(uint32_t){(uint32_t)value}, sizeof(uint32_t));
+        break;
+    default:
+        memcpy(place, &value, sizeof value);
+        break;
+    }
+}
+
+/** Values change, in memory and in the truth. */
 static void change_values(controller_t *self, truth_t *truth)
 {
     uint16_t slot = 0;
 
     for (uint16_t i = 0; i < self->entry_count; i++) {
-        uint8_t size = self->entries[i].size;
+        canopy_trace_kind_t kind = self->entries[i].kind;
+        unsigned bits = 8u * bytes_of(kind);
         uint64_t value = self->entries[i].value;
-        uint8_t bytes[8];
 
         if (random_chance(&self->random, self->mood.value_flips)) {
             value = random_bits(&self->random) | (uint64_t)random_bits(&self->random) << 32;
             if (random_chance(&self->random, 300)) {
                 value = (uint64_t)0 - random_below(&self->random, 3u);
             }
-            value &= UINT64_MAX >> (64u - 8u * size);
+            value &= UINT64_MAX >> (64u - bits);
             self->entries[i].value = value;
         }
-        switch (size) { /* memcpy of an object of the size, so that the order of its bytes is the machine's */
-        case 1:
-            bytes[0] = (uint8_t)value;
-            break;
-        case 2:
-            memcpy(bytes, &(uint16_t){(uint16_t)value}, 2);
-            break;
-        case 4:
-            memcpy(bytes, &(uint32_t){(uint32_t)value}, 4);
-            break;
-        default:
-            memcpy(bytes, &value, 8);
-            break;
-        }
-        memcpy(&self->memory[(size_t)8u * i], bytes, size);
-        if (self->entries[i].is_signed && (value >> (8u * size - 1u) & 1u) != 0) {
-            value |= UINT64_MAX << (8u * size);
+        store(&self->memory[(size_t)8u * i], kind, value);
+        if ((kind == CANOPY_TRACE_I8 || kind == CANOPY_TRACE_I16) && (value >> (bits - 1u) & 1u) != 0) {
+            value |= UINT64_MAX << bits;
         }
         truth->values[slot++] = (uint32_t)value;
-        if (size == 8u) {
+        if (bits == 64u) {
             truth->values[slot++] = (uint32_t)(value >> 32);
         }
     }

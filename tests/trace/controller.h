@@ -61,8 +61,7 @@ typedef struct {
     uint8_t sent[NODES_MAX];
     canopy_trace_value_t values[SLOTS_MAX];
     struct {
-        uint8_t size; /**< 1, 2, 4, 8 */
-        bool is_signed;
+        canopy_trace_kind_t kind; /* of its first slot */
         uint64_t value;
     } entries[SLOTS_MAX];
     uint16_t entry_count;

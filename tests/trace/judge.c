@@ -5,8 +5,6 @@
 
 #include "check.h"
 
-enum { LETTERS = 15 };
-
 uint32_t judge_known_within(const controller_t *controller)
 {
     uint32_t parts = (controller->ref.count + 9u) / 10u;
@@ -111,32 +109,35 @@ static void judge_whole(judge_t *self, const truth_t *truth)
     CHECK(!self->is_disturbed || ago <= judge_known_within(controller) + (controller->mood.bus_frames > 0 ? 5u : 0u));
 }
 
-static char letter(const decoder_cell_t *cell)
+/** What has changed of the cells since the tick shown before: for the other decoder. */
+static void log_cells(const judge_t *self, const char *kind, const decoder_cell_t *cells, decoder_cell_t *logged,
+                      uint16_t number)
 {
-    static const char certain[] = "0123456789abcde", old[] = "GHIJKLMNOPQRSTU";
+    for (uint16_t i = 0; i < number; i++) {
+        const decoder_cell_t *cell = &cells[i];
 
-    if (cell->is_certain) {
-        return certain[cell->shown % LETTERS];
-    }
-    return cell->is_known ? old[cell->told % LETTERS] : '-';
-}
-
-static void log_tick(const judge_t *self)
-{
-    (void)fprintf(self->log, "T %u ", (unsigned)self->decoder.tick.number);
-    for (uint16_t i = 0; i < self->model.node_count; i++) {
-        (void)fputc(letter(&self->nodes[i]), self->log);
-    }
-    for (uint16_t i = 0; i < self->model.slot_count; i++) {
-        const decoder_cell_t *slot = &self->slots[i];
-
-        if (slot->is_certain || slot->is_known) {
-            (void)fprintf(self->log, " %s%08X", slot->is_certain ? "" : "?",
-                          (unsigned)(slot->is_certain ? slot->shown : slot->told));
+        if (cell->is_certain == logged[i].is_certain && cell->is_known == logged[i].is_known &&
+            cell->told == logged[i].told && cell->shown == logged[i].shown && cell->since == logged[i].since &&
+            cell->is_since_exact == logged[i].is_since_exact) {
+            continue;
+        }
+        logged[i] = *cell;
+        if (cell->is_certain) {
+            (void)fprintf(self->log, " %s%u=%u,%u,%u", kind, (unsigned)i, (unsigned)cell->shown, (unsigned)cell->since,
+                          cell->is_since_exact ? 1u : 0u);
+        } else if (cell->is_known) {
+            (void)fprintf(self->log, " %s%u=%u", kind, (unsigned)i, (unsigned)cell->told);
         } else {
-            (void)fputs(" -", self->log);
+            (void)fprintf(self->log, " %s%u=", kind, (unsigned)i);
         }
     }
+}
+
+static void log_tick(judge_t *self)
+{
+    (void)fprintf(self->log, "T %u", (unsigned)self->decoder.tick.number);
+    log_cells(self, "", self->nodes, self->logged_nodes, self->model.node_count);
+    log_cells(self, "v", self->slots, self->logged_slots, self->model.slot_count);
     (void)fputc('\n', self->log);
 }
 
@@ -193,8 +194,9 @@ void judge_start(judge_t *self, const controller_t *controller, const channel_t 
                                     .slot_count = controller->config.value_count};
     decoder_init(&self->decoder, &self->model, self->nodes, self->slots, show, self);
     if (log != NULL) {
-        (void)fprintf(log, "M %u %08X %u %u\n", (unsigned)self->model.base, (unsigned)self->model.hash,
-                      (unsigned)self->model.node_count, (unsigned)self->model.slot_count);
+        (void)fprintf(log, "M %08X %u %u %u %d\n", (unsigned)self->model.hash, (unsigned)self->model.node_count,
+                      (unsigned)self->model.slot_count, (unsigned)self->model.changes_max,
+                      (int)controller->config.data_id);
     }
 }
 
@@ -216,7 +218,7 @@ static void hear(judge_t *self, const canopy_can_frame_t *frame, uint64_t tick)
     bool is_tick = frame->id == CONTROLLER_ID;
 
     if (self->log != NULL) {
-        (void)fprintf(self->log, "F %X ", (unsigned)frame->id);
+        (void)fprintf(self->log, "F %u ", (unsigned)(frame->id - CONTROLLER_ID));
         for (unsigned i = 0; i < frame->length; i++) {
             (void)fprintf(self->log, "%02X", frame->data[i]);
         }

@@ -60,6 +60,8 @@ typedef struct {
     bool is_lost_less;   /**< 64 and more at once: Sequence shows less. */
     tally_t *tally;
     FILE *log; /**< Frames and what is shown of them, for the other decoder; or NULL. */
+    decoder_cell_t logged_nodes[NODES_MAX];
+    decoder_cell_t logged_slots[SLOTS_MAX];
 } judge_t;
 
 /** A receiver that joins. */
