@@ -48,12 +48,12 @@ bool decoder_arrivals(decoder_t *self, const uint8_t *data)
     if (bytes == 0) {
         return false;
     }
-    if (!self->is_at_hand || (data[0] & 15u) != tick->number % 16u || tick->snapshot_came || tick->has_node ||
-        tick->values_came > 0 || (tick->inputs.came && !tick->arrivals_open)) {
+    if (!self->has_ticked || (data[0] & 15u) != tick->number % 16u || tick->snapshot_came || tick->has_node ||
+        tick->values_came > 0) {
         decoder_stray(self);
         return true;
     }
-    if (tick->inputs.came) { /* without it, nobody knows what these ages are */
+    if (self->is_at_hand && tick->arrivals_open) { /* without CanopyInputs nobody knows what these ages are */
         add_ages(&tick->inputs, &data[1], bytes);
         tick->arrivals_open = data[0] >> 7 == 0;
         tick->inputs.is_whole = !tick->arrivals_open;

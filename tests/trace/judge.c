@@ -40,6 +40,9 @@ static void judge_cells(judge_t *self, const decoder_cell_t *cells, uint16_t cou
 static void judge_inputs(const judge_t *self, const truth_t *truth)
 {
     const decoder_inputs_t *inputs = &self->decoder.tick.inputs;
+    bool is_free = self->controller->mood.bus_frames == 0 && !(self->has_lost && self->any_lost_in >= self->tick);
+
+    CHECK(!is_free || (inputs->came && inputs->is_whole && inputs->age_bytes == truth->age_bytes));
 
     if (!inputs->came || !inputs->is_sure) {
         return;
@@ -87,13 +90,14 @@ static void judge_whole(judge_t *self, const truth_t *truth)
         count(self->nodes, self->model.node_count, &tally->nodes_certain, &tally->nodes_old, &tally->nodes_unknown);
     bool slots =
         count(self->slots, self->model.slot_count, &tally->slots_certain, &tally->slots_old, &tally->slots_unknown);
-    bool follows = self->has_shown && self->last_shown + 1u == self->tick;
+    bool begins = self->tick == controller->first && truth->number == 0;
+    bool follows = begins || (self->has_shown && self->last_shown + 1u == self->tick);
     uint64_t ago = self->tick > self->lost_in ? self->tick - self->lost_in : 0;
 
     if (!self->is_disturbed && follows) {
         /* One CanopyChange has room for one node at least, and for five that are close. One CanopyValue may be a slow one. */
-        CHECK(nodes || !self->was_all_certain || truth->changed_nodes > controller->config.changes_max);
-        CHECK(slots || !self->were_slots_certain || truth->changed_slots >= controller->config.values_max);
+        CHECK(nodes || !(begins || self->was_all_certain) || truth->changed_nodes > controller->config.changes_max);
+        CHECK(slots || !(begins || self->were_slots_certain) || truth->changed_slots >= controller->config.values_max);
     }
     self->was_all_certain = nodes;
     self->were_slots_certain = slots;
@@ -135,6 +139,9 @@ static void log_cells(const judge_t *self, const char *kind, const decoder_cell_
 
 static void log_tick(judge_t *self)
 {
+    if (self->log == NULL) {
+        return;
+    }
     (void)fprintf(self->log, "T %u", (unsigned)self->decoder.tick.number);
     log_cells(self, "", self->nodes, self->logged_nodes, self->model.node_count);
     log_cells(self, "v", self->slots, self->logged_slots, self->model.slot_count);
@@ -147,6 +154,11 @@ static void show(void *context, const decoder_t *decoder)
     const truth_t *truth = controller_truth(self->controller, self->tick);
     uint32_t codes[NODES_MAX];
 
+    if (self->channel->damaged > 0) {
+        self->tally->shown++;
+        log_tick(self);
+        return;
+    }
     CHECK(truth != NULL);
     CHECK(decoder->tick.number == truth->number);
     CHECK(decoder->tick.root == (uint8_t)truth->root);
@@ -169,9 +181,7 @@ static void show(void *context, const decoder_t *decoder)
     self->has_shown = true;
     self->last_shown = self->tick;
     self->tally->shown++;
-    if (self->log != NULL) {
-        log_tick(self);
-    }
+    log_tick(self);
 }
 
 void judge_start(judge_t *self, const controller_t *controller, const channel_t *channel, uint64_t seed, tally_t *tally,
@@ -211,6 +221,17 @@ static bool is_lost(judge_t *self)
         return true;
     }
     return random_chance(&self->random, self->channel->of_1000);
+}
+
+/** Flips a bit, but none of those that stop a decoder: CanopyModel, and Version in CanopyTick. */
+static void damage(judge_t *self, canopy_can_frame_t *frame)
+{
+    uint32_t bit = random_below(&self->random, 64u);
+
+    if (random_chance(&self->random, self->channel->damaged) && frame->id != CONTROLLER_ID + 7u &&
+        !(frame->id == CONTROLLER_ID && bit / 4u == 3u)) {
+        frame->data[bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+    }
 }
 
 static void hear(judge_t *self, const canopy_can_frame_t *frame, uint64_t tick)
@@ -272,13 +293,13 @@ void judge_tick(judge_t *self)
         self->lost_in = tick;
     }
     for (uint16_t i = 0; i < controller->out_count; i++) {
-        const canopy_can_frame_t *frame = &controller->out[i];
-        uint32_t message = frame->id - CONTROLLER_ID;
+        canopy_can_frame_t frame = controller->out[i];
+        uint32_t message = frame.id - CONTROLLER_ID;
         bool has_sequence = message == 0 || message == 3u || message == 4u;
 
         self->tally->frames++;
         if (has_sequence && controller->mood.bus_frames == 0) {
-            judge_sequence(self, &frame->data[message == 0 ? 6 : 0], tick);
+            judge_sequence(self, &frame.data[message == 0 ? 6 : 0], tick);
         }
         if (self->has_clock && self->decoder.is_at_hand && tick - self->came_in >= CANOPY_TRACE_PERIODS) {
             if (self->log != NULL) {
@@ -288,17 +309,20 @@ void judge_tick(judge_t *self)
         }
         if ((i >= self->silent_from && i < self->silent_to) || is_lost(self)) {
             self->tally->lost++;
+            self->any_lost_in = tick;
+            self->has_lost = true;
             self->lost_since += has_sequence ? 1u : 0u;
             if (has_sequence || message == 5u) {
                 self->is_disturbed = true;
                 self->lost_in = tick;
             }
         } else {
-            hear(self, frame, tick);
+            damage(self, &frame);
+            hear(self, &frame, tick);
         }
     }
     CHECK(self->decoder.stop == DECODER_RUNS);
-    CHECK(self->only_counts || self->decoder.refused == 0);
+    CHECK(self->only_counts || self->channel->damaged > 0 || self->decoder.refused == 0);
 }
 
 void judge_note_start(judge_t *self)
@@ -319,7 +343,10 @@ void judge_end(judge_t *self)
         self->lost_in = self->controller->ticks;
     }
     decoder_silence(&self->decoder);
-    if (self->controller->mood.bus_frames == 0) {
+    if (self->log != NULL) {
+        (void)fprintf(self->log, "E %u\n", (unsigned)self->decoder.refused);
+    }
+    if (self->controller->mood.bus_frames == 0 && self->channel->damaged == 0) {
         CHECK(self->is_lost_less ? self->decoder.lost <= self->lost_told : self->decoder.lost == self->lost_told);
     }
 }

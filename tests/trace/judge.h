@@ -17,6 +17,7 @@ typedef struct {
     uint32_t of_1000;    /**< Each by itself. */
     uint32_t bursts;     /**< Of 1000 frames so many begin a burst, */
     uint32_t burst_most; /**< which takes 1 to so many frames. */
+    uint32_t damaged;    /**< Of 1000 frames so many have a bit flipped: nothing is judged but by the other decoder. */
 } channel_t;
 
 /** What was seen. */
@@ -47,8 +48,10 @@ typedef struct {
     unsigned silent_from, silent_to; /**< Of a tick's frames these are lost, too: from the one on, up to the other. */
     uint64_t tick;                   /**< The tick at hand, counted like controller_t.ticks. */
     uint64_t came_in;                /**< The tick in which its CanopyTick came. */
-    uint64_t lost_in;                /**< The tick in which a frame was lost last. */
-    bool is_disturbed;               /**< Something was lost since all was known. */
+    uint64_t lost_in;                /**< The tick in which a frame of nodes or values was lost last. */
+    uint64_t any_lost_in;            /**< The same of any frame. */
+    bool has_lost;
+    bool is_disturbed; /**< Something was lost since all was known. */
     uint64_t last_shown;
     bool has_shown, was_all_certain, were_slots_certain;
     uint32_t burst;   /**< Frames of a burst that are still to be lost. */

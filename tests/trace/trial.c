@@ -10,6 +10,7 @@
  *
  *     M hash nodes slots changes_max guard     a controller and a receiver that joins
  *     F message data                           a frame: 0 CanopyTick … 7 CanopyModel
+ *     E refused                                the end, and how many frames were refused
  *     S                                        silence: the tick at hand is over
  *     T tick [node=[code[,since,exact]] …]     a tick is shown: what has changed of nodes and, with a v, of slots.
  *                                              Without code: unknown; without since: not certain
@@ -34,6 +35,7 @@ static const channel_t channels[] = {
     {.name = "50 %", .of_1000 = 500},
     {.name = "bursts of up to 40", .bursts = 5, .burst_most = 40},
     {.name = "bursts of up to 400", .bursts = 1, .burst_most = 400},
+    {.name = "1 %, 2 % damaged", .of_1000 = 10, .damaged = 20},
 };
 enum { CHANNELS = sizeof channels / sizeof channels[0] };
 
@@ -61,15 +63,19 @@ static void run(const channel_t *channel, uint64_t seed, tally_t *tally, FILE *l
     uint32_t joins_at = random_chance(&random, 500) ? 0 : random_below(&random, RUN_TICKS / 4);
     bool is_free = channel == &channels[0];
     const channel_t *now = channel;
+    uint64_t shown = tally->shown;
 
     controller_make(&controller, seed, &mood, 0);
+    if (channel->damaged > 0) { /* Crc would refuse what is damaged */
+        controller.config.data_id = CANOPY_E2E_NONE;
+    }
     controller_start(&controller, number);
     for (uint32_t i = 0; i < joins_at; i++) {
         controller_tick(&controller);
     }
     judge_start(&judge, &controller, channel, seed, tally, log);
     for (uint32_t i = 0; i < RUN_TICKS; i++) {
-        if (random_chance(&random, is_free ? 0u : now == channel ? 5u : 20u)) {
+        if (channel->damaged == 0 && random_chance(&random, is_free ? 0u : now == channel ? 5u : 20u)) {
             now = now == channel ? &channels[0] : channel;
             judge.channel = now;
         }
@@ -81,6 +87,7 @@ static void run(const channel_t *channel, uint64_t seed, tally_t *tally, FILE *l
         judge_tick(&judge);
     }
     judge_end(&judge);
+    CHECK(!is_free || mood.bus_frames > 0 || tally->shown == shown + RUN_TICKS);
 }
 
 static void print(FILE *table, const channel_t *channel, const tally_t *tally)
