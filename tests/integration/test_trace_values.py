@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -184,20 +185,16 @@ def test_it_is_replayed_with_its_values_and_its_protection(run: Run, tmp_path: P
 
     status, text = replay(run.frames[:ended])
     assert (status, text) == (0, f"app: {TICKS} ticks replayed, {ended} frames compared: all equal\n")
-    spoilt = [can.Message(**_fields(frame)) for frame in run.frames[:ended]]
+    spoilt = copy.deepcopy(run.frames[:ended])
     value = next(frame for frame in spoilt[ended // 2 :] if frame.arbitration_id == run.model.trace.ids["CanopyValue"])
     value.data[4] ^= 1
     status, text = replay(spoilt)
     assert status == 1
     assert "CanopyValue: value '" in text
-    spoilt = [can.Message(**_fields(frame)) for frame in run.frames[:ended]]
+    spoilt = copy.deepcopy(run.frames[:ended])
     ticks = [frame for frame in spoilt if frame.arbitration_id == BASE]
     ticks[300].data[0] ^= 1
     status, text = replay(spoilt)
     assert status == 1
     assert "tick 300 (frame " in text
     assert "CanopyTick: Crc: recorded" in text
-
-
-def _fields(frame: can.Message) -> dict[str, object]:
-    return {"arbitration_id": frame.arbitration_id, "is_extended_id": frame.is_extended_id, "data": bytes(frame.data)}
