@@ -95,10 +95,13 @@ static void print(const channel_t *channel, const tally_t *tally)
     double nodes = (double)(tally->nodes_certain + tally->nodes_old + tally->nodes_unknown) / 100.0;
     double slots = (double)(tally->slots_certain + tally->slots_old + tally->slots_unknown) / 100.0;
 
-    fprintf(stderr,
-            "%-20s %9" PRIu64 " %9" PRIu64 " %10" PRIu64 " %9" PRIu64
-            "   %6.2f %6.2f %6.2f   %6.2f %6.2f %6.2f   %u of %u\n",
-            channel->name, tally->ticks, tally->shown, tally->frames, tally->lost, (double)tally->nodes_certain / nodes,
+    fprintf(stderr, "%-20s %9" PRIu64 " %9" PRIu64 " %10" PRIu64 " %9" PRIu64, channel->name, tally->ticks,
+            tally->shown, tally->frames, tally->lost);
+    if (channel->damaged > 0) {
+        fprintf(stderr, "   for the other decoder\n");
+        return;
+    }
+    fprintf(stderr, "   %6.2f %6.2f %6.2f   %6.2f %6.2f %6.2f   %u of %u\n", (double)tally->nodes_certain / nodes,
             (double)tally->nodes_old / nodes, (double)tally->nodes_unknown / nodes,
             (double)tally->slots_certain / slots, (double)tally->slots_old / slots,
             (double)tally->slots_unknown / slots, (unsigned)tally->known_after, (unsigned)tally->promised);
