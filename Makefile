@@ -101,6 +101,11 @@ test-logic: # canopy verify --never and --always: circuits, and what berkeley-ab
 	$(SETUP)/make-venv can,lcm,test,verify,differential
 	$(PYTEST) -m logic tests/logic
 
+test-trace: # the trace with losses: a million ticks for each way to lose frames, and a million in both decoders
+	$(call BUILD,host)
+	seed=$${CANOPY_SEED:-$$(date +%s)}; build/host/tests/trace/trace_trial 7000000 $$seed && \
+	CANOPY_TRACE_TICKS=1000000 CANOPY_SEED=$$seed $(PYTEST) -s tests/integration/test_trace_decoders.py
+
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan

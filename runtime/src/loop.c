@@ -27,9 +27,8 @@ static bool is_complete(const canopy_loop_config_t *config)
     const canopy_app_t *app = config->app;
 
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
-           app->bus_state != NULL && app->input != NULL &&
-           app->output != NULL && (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL &&
-           app->rx_max > 0u && app->frame_us > 0u;
+           app->bus_state != NULL && app->input != NULL && app->output != NULL &&
+           (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->rx_max > 0u && app->frame_us > 0u;
 }
 
 static void start_bus(const canopy_app_t *app)

@@ -7,10 +7,10 @@
 #include "canopy/e2e.h"
 #include "trace_parts.h"
 
-enum { HAS_SNAPSHOT = 0x40, HAS_CHANGES = 0x80 };           /* of CanopyTick's byte 6 */
-enum { OVERLOAD = 0x08, RETURNING = 0x10, MANY = 0x80 };    /* of CanopyInputs' byte 5 */
+enum { HAS_SNAPSHOT = 0x40, HAS_CHANGES = 0x80 };            /* of CanopyTick's byte 6 */
+enum { OVERLOAD = 0x08, RETURNING = 0x10, MANY = 0x80 };     /* of CanopyInputs' byte 5 */
 enum { AGES_AT = 5, AGES_IN_INPUTS = 2, AGES_AND_MORE = 3 }; /* bits 5 and 6 there */
-enum { ANNOUNCEMENTS = 3 }; /* of another tree: in so many ticks */
+enum { ANNOUNCEMENTS = 3 };                                  /* of another tree: in so many ticks */
 enum { AGES_IN_FRAME = 7, LAST = 0x80, LONG_AGE = 255, MANY_FRAMES = 256 };
 
 static void send_tick(const canopy_trace_sink_t *sink, const canopy_trace_tick_t *tick, unsigned flags, uint8_t values)

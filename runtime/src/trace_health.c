@@ -81,9 +81,11 @@ static void put_faults(const canopy_loop_t *loop, uint8_t *data)
 
 void canopy_trace_health(const canopy_loop_t *loop, canopy_time_t until)
 {
-    static void (*const pages[PAGES])(const canopy_loop_t *loop, uint8_t *data) = {
-        [RECEIVE] = put_receive, [TRANSMIT] = put_transmit, [TIMING] = put_timing, [LATENESS] = put_lateness,
-        [FAULTS] = put_faults};
+    static void (*const pages[PAGES])(const canopy_loop_t *loop, uint8_t *data) = {[RECEIVE] = put_receive,
+                                                                                   [TRANSMIT] = put_transmit,
+                                                                                   [TIMING] = put_timing,
+                                                                                   [LATENESS] = put_lateness,
+                                                                                   [FAULTS] = put_faults};
     const canopy_app_t *app = loop->config->app;
     canopy_trace_state_t *state = app->trace_state;
     canopy_tx_trace_data_t data = {{0}};

@@ -104,7 +104,8 @@ static unsigned entries_for(const changes_t *self, uint16_t node)
     if (self->frames == 0u || node < self->position) {
         return ENTRIES + 1;
     }
-    return 1u + ((node - self->position) / (unsigned)BLOCK + (unsigned)SKIP_BLOCKS_MAX - 1u) / (unsigned)SKIP_BLOCKS_MAX;
+    return 1u +
+           ((node - self->position) / (unsigned)BLOCK + (unsigned)SKIP_BLOCKS_MAX - 1u) / (unsigned)SKIP_BLOCKS_MAX;
 }
 
 static void put_entry(changes_t *self, unsigned gap, unsigned code)

@@ -15,11 +15,11 @@ static uint32_t read_other(const canopy_trace_value_t *value, const void *from)
     case CANOPY_TRACE_U8:
         return *(const uint8_t *)from;
     case CANOPY_TRACE_I8:
-        return (uint32_t) * (const int8_t *)from;
+        return (uint32_t)*(const int8_t *)from;
     case CANOPY_TRACE_U16:
         return *(const uint16_t *)from;
     case CANOPY_TRACE_I16:
-        return (uint32_t) * (const int16_t *)from;
+        return (uint32_t)*(const int16_t *)from;
     case CANOPY_TRACE_LOW:
         return (uint32_t)(*(const uint64_t *)from & UINT32_MAX);
     case CANOPY_TRACE_HIGH:
@@ -54,8 +54,8 @@ static void choose(canopy_trace_choice_t *choice, uint16_t slot)
 }
 
 /** Chooses the changed values in [from, to). @return the first one for which there is no room, or `to` */
-static uint16_t choose_changed(const canopy_trace_config_t *config, const canopy_trace_state_t *state, const void *memory,
-                               canopy_trace_choice_t *choice, uint16_t from, uint16_t to)
+static uint16_t choose_changed(const canopy_trace_config_t *config, const canopy_trace_state_t *state,
+                               const void *memory, canopy_trace_choice_t *choice, uint16_t from, uint16_t to)
 {
     const uint32_t *told = state->told;
     const canopy_trace_value_t *values = config->values;

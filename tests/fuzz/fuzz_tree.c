@@ -325,12 +325,11 @@ static void run(tables_t *tables)
     static uint16_t words[WORDS + 1];
     static canopy_tree_instance_t self;
     const canopy_can_t can = {.send = take_frame};
-    const canopy_trace_config_t config = {
-        .data_id = CANOPY_E2E_NONE,
-        .snapshot_every = 5,
-        .health_every = 3,
-        .model_every = 2,
-        .changes_max = (uint8_t)(1u + take8(&input) % CANOPY_TRACE_CHANGES_MAX)};
+    const canopy_trace_config_t config = {.data_id = CANOPY_E2E_NONE,
+                                          .snapshot_every = 5,
+                                          .health_every = 3,
+                                          .model_every = 2,
+                                          .changes_max = (uint8_t)(1u + take8(&input) % CANOPY_TRACE_CHANGES_MAX)};
     static const canopy_bus_t no_messages;
     const canopy_bus_state_t bus = {.bus = &no_messages, .counters.unknown_id = take32(&input)};
     canopy_tx_trace_t waiting[64];

@@ -248,8 +248,7 @@ static void forget(const canopy_node_t *nodes, uint8_t *status, uint16_t *words)
     for (uint16_t node = 0; node < tree.node_count; node++) {
         uint8_t type = nodes[node].type;
 
-        for (uint8_t word = words_in_use(type, canopy_status_runs(status[node])); word < shapes[type].words;
-             word++) {
+        for (uint8_t word = words_in_use(type, canopy_status_runs(status[node])); word < shapes[type].words; word++) {
             words[nodes[node].state + word] = (uint16_t)Frama_C_unsigned_int_interval(0, UINT16_MAX);
         }
         if (canopy_status_now(status[node]) == CANOPY_IDLE) {

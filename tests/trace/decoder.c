@@ -50,7 +50,7 @@ static void end_tick(decoder_t *self)
 {
     const decoder_tick_t *tick = &self->tick;
     bool has_tail = tick->has_changes ? tick->last_came : tick->snapshot_came || !tick->has_snapshot;
-    bool is_complete = has_tail && !tick->broken;
+    bool is_complete = has_tail && !tick->broken && tick->snapshot_came == tick->has_snapshot;
     bool has_values = tick->values_came == tick->values;
 
     if (!self->is_at_hand) {

@@ -37,13 +37,13 @@ typedef struct {
 
 /** A node, or a slot. Read `is_certain`, `shown` and what follows when a tick is over; the rest is the decoder's. */
 typedef struct {
-    uint32_t told;   /**< Code, or 32 bits of a value, told last. */
-    uint32_t marked; /**< The tick that is at hand has told it, or says that it has not changed: decoder_t.mark. */
-    bool is_known;   /**< `told` may be shown as old; else it is not to be shown at all. */
-    bool is_certain; /**< `shown` is the truth at the end of this tick. */
-    uint32_t shown;
-    bool is_since_exact; /**< It became so in the tick `since`; else in this tick or an earlier one. */
+    uint32_t told;       /**< Code, or 32 bits of a value, told last. */
+    uint32_t marked;     /**< The tick that is at hand has told it, or says that it has not changed: decoder_t.mark. */
+    uint32_t shown;      /**< With is_certain. */
     uint32_t since;      /**< Number of a tick. */
+    bool is_known;       /**< `told` may be shown as old; else it is not to be shown at all. */
+    bool is_certain;     /**< `shown` is the truth at the end of this tick. */
+    bool is_since_exact; /**< It became so in the tick `since`; else in this tick or an earlier one. */
 } decoder_cell_t;
 
 /** What a tick worked with; `came` is false when CanopyInputs was lost. */

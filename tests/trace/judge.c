@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "judge.h"
 
+#include <inttypes.h>
 #include <string.h>
 
 #include "check.h"
@@ -239,7 +240,7 @@ static void hear(judge_t *self, const canopy_can_frame_t *frame, uint64_t tick)
     bool is_tick = frame->id == CONTROLLER_ID;
 
     if (self->log != NULL) {
-        (void)fprintf(self->log, "F %u ", (unsigned)(frame->id - CONTROLLER_ID));
+        (void)fprintf(self->log, "F %" PRIu32 " ", frame->id - CONTROLLER_ID);
         for (unsigned i = 0; i < frame->length; i++) {
             (void)fprintf(self->log, "%02X", frame->data[i]);
         }

@@ -62,7 +62,7 @@ static unsigned most_ticks_until_told(uint8_t changes_max, uint16_t flipping)
 {
     unsigned most = 0;
 
-    for (unsigned at = 100; at < 140; at++) {
+    for (unsigned at = 100; at < 120; at++) {
         unsigned ticks = ticks_until_told(changes_max, flipping, at);
 
         most = ticks > most ? ticks : most;

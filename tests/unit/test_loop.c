@@ -6,10 +6,7 @@
 #include "fake_can.h"
 #include "unity.h"
 
-enum {
-    NODES = 13,
-    PERIOD_US = 1000
-};
+enum { NODES = 13, PERIOD_US = 1000 };
 
 /* --- an application by hand: a ReactiveFallback over twelve conditions -------------------------------------------- */
 

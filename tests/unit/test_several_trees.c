@@ -74,7 +74,8 @@ static int controller_send(void *context, uint8_t mailbox, const canopy_can_fram
         }
     }
     /* Snapshots, changes and the model come when they come. */
-    unexpected += (frame->id >= 0x602u && frame->id <= 0x607u) || (frame->id >= 0x612u && frame->id <= 0x617u) ? 0u : 1u;
+    unexpected +=
+        (frame->id >= 0x602u && frame->id <= 0x607u) || (frame->id >= 0x612u && frame->id <= 0x617u) ? 0u : 1u;
     return 1;
 }
 
@@ -164,8 +165,10 @@ static void each_sees_the_wire_and_what_the_other_sends(void)
     TEST_ASSERT_EQUAL_UINT8(42, echoed);
     TEST_ASSERT_EQUAL_INT16(100, driver_input->wheels.speed);
     TEST_ASSERT_EQUAL_INT16(100, navigator_input->wheels.speed);
-    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS, canopy_tree_status_code(driver_app.tree_instance, 0));
-    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS, canopy_tree_status_code(navigator_app.tree_instance, 0));
+    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS,
+                            canopy_tree_status_code(driver_app.tree_instance, 0));
+    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS,
+                            canopy_tree_status_code(navigator_app.tree_instance, 0));
     for (unsigned end = 0; end < 2u; end++) {
         const canopy_can_t *can = end == 0u ? &driver_end.can : &navigator_end.can;
 
@@ -185,7 +188,8 @@ static void one_that_says_stop_stops_all_and_all_send_safe_values(void)
     TEST_ASSERT_EQUAL_UINT32(1, navigator.ticks);
     TEST_ASSERT_EQUAL_UINT(4, last_commands);
     TEST_ASSERT_EQUAL_UINT(0, unsafe);
-    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS, canopy_tree_status_code(navigator_app.tree_instance, 0));
+    TEST_ASSERT_EQUAL_UINT8(CANOPY_CODE_RESET_BEFORE + CANOPY_SUCCESS,
+                            canopy_tree_status_code(navigator_app.tree_instance, 0));
 }
 
 static void of_two_that_are_due_together_the_first_in_the_list_is_first(void)

@@ -23,8 +23,8 @@ typedef struct {
 
 #define VALUE(member, its_kind) {.offset = offsetof(values_t, member), .kind = CANOPY_TRACE_##its_kind}
 static const canopy_trace_value_t traced[] = {
-    VALUE(small, I8),  VALUE(byte, U8),   VALUE(half, I16),      VALUE(unsigned_half, U16),     VALUE(word, WORD),
-    VALUE(whole, LOW), VALUE(whole, HIGH), VALUE(single, FLOAT), VALUE(twice, DOUBLE_LOW), VALUE(twice, DOUBLE_HIGH)};
+    VALUE(small, I8),  VALUE(byte, U8),    VALUE(half, I16),     VALUE(unsigned_half, U16), VALUE(word, WORD),
+    VALUE(whole, LOW), VALUE(whole, HIGH), VALUE(single, FLOAT), VALUE(twice, DOUBLE_LOW),  VALUE(twice, DOUBLE_HIGH)};
 enum { SLOTS = sizeof traced / sizeof traced[0] };
 
 static small_memory_t memory;
@@ -115,8 +115,8 @@ static void expect(canopy_trace_message_t message, unsigned number, const uint8_
 /** A frame of message `number` that has arrived `age_ms` ago. */
 static void arrive(unsigned number, unsigned age_ms)
 {
-    fake.rx[fake.rx_count++] = (canopy_can_frame_t){
-        .time = clock_now - 1000u * (canopy_time_t)age_ms, .id = RX_ID + number, .length = 1};
+    fake.rx[fake.rx_count++] =
+        (canopy_can_frame_t){.time = clock_now - 1000u * (canopy_time_t)age_ms, .id = RX_ID + number, .length = 1};
 }
 
 /** A cycle that takes what has arrived. */
@@ -165,8 +165,7 @@ static void the_heartbeat_can_be_guarded(void)
     traces.data_id = DATA_ID;
     for (unsigned number = 0; number < 40u; number++) {
         cycle(0);
-        TEST_ASSERT_EQUAL(CANOPY_E2E_OK,
-                          canopy_e2e_check(&receiver, DATA_ID, frame_of(CANOPY_TRACE_TICK, 0)->data, 8));
+        TEST_ASSERT_EQUAL(CANOPY_E2E_OK, canopy_e2e_check(&receiver, DATA_ID, frame_of(CANOPY_TRACE_TICK, 0)->data, 8));
         TEST_ASSERT_EQUAL_UINT8(number % CANOPY_E2E_COUNTERS, frame_of(CANOPY_TRACE_TICK, 0)->data[1] & 15u);
         TEST_ASSERT_EQUAL_UINT8(CANOPY_TRACE_VERSION, frame_of(CANOPY_TRACE_TICK, 0)->data[1] >> 4);
     }
@@ -333,7 +332,8 @@ static void expect_value(unsigned number, unsigned slot, uint32_t value)
 
     TEST_ASSERT_EQUAL_UINT(slot, data[0] | (data[1] & 15u) << 8);
     TEST_ASSERT_EQUAL_UINT8((loop.ticks - 1u) & 15u, data[1] >> 4);
-    TEST_ASSERT_EQUAL_HEX32(value, data[4] | (uint32_t)data[5] << 8 | (uint32_t)data[6] << 16 | (uint32_t)data[7] << 24);
+    TEST_ASSERT_EQUAL_HEX32(value,
+                            data[4] | (uint32_t)data[5] << 8 | (uint32_t)data[6] << 16 | (uint32_t)data[7] << 24);
 }
 
 static void values_are_told_when_they_change(void)
@@ -424,8 +424,10 @@ static void a_value_whose_turn_it_is_comes_once_though_it_has_changed(void)
 
 static void health_has_five_pages_in_turn(void)
 {
-    static const uint8_t pages[][8] = {{0, 3, 0, 4, 0, 5, 0, 6},          {1, 7, 0, 8, 0, 9, 0, 10},
-                                       {2, 11, 0, 0x56, 0x34, 0x12, 13, 0}, {3, 0x10, 0x22, 0, 0, 0, 0xF1, 14},
+    static const uint8_t pages[][8] = {{0, 3, 0, 4, 0, 5, 0, 6},
+                                       {1, 7, 0, 8, 0, 9, 0, 10},
+                                       {2, 11, 0, 0x56, 0x34, 0x12, 13, 0},
+                                       {3, 0x10, 0x22, 0, 0, 0, 0xF1, 14},
                                        {4, 15, 0, 16, 0, 17, 0, 0}};
 
     traces.health_every = 2;

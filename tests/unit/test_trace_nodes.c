@@ -42,15 +42,12 @@ void setUp(void)
     fake_can_reset();
     bus_state = (canopy_bus_state_t){.bus = &bus};
     instance = (canopy_tree_instance_t){.tree = &tree, .status = status};
-    config = (canopy_trace_config_t){.id = ID,
-                                     .data_id = CANOPY_E2E_NONE,
-                                     .changes_max = 4,
-                                     .snapshot_every = 60000,
-                                     .model_every = 60000};
+    config = (canopy_trace_config_t){
+        .id = ID, .data_id = CANOPY_E2E_NONE, .changes_max = 4, .snapshot_every = 60000, .model_every = 60000};
     state = (canopy_trace_state_t){.sent = sent};
-    TEST_ASSERT_EQUAL(CANOPY_OK,
-                      canopy_tx_init(&tx, NULL, 0, &(canopy_tx_memory_t){.trace = places, .trace_capacity = PLACES},
-                                     &fake_can));
+    TEST_ASSERT_EQUAL(
+        CANOPY_OK,
+        canopy_tx_init(&tx, NULL, 0, &(canopy_tx_memory_t){.trace = places, .trace_capacity = PLACES}, &fake_can));
     start(20);
 }
 
@@ -134,9 +131,9 @@ static void codes_say_what_was_last_and_when(void)
         {F | WAS | OLD, 14, CANOPY_IDLE},
         {K | WAS, 4, CANOPY_IDLE},
         {K | WAS | OLD, 8, CANOPY_IDLE},
-        {3, 0, CANOPY_IDLE},   /* never stored */
-        {6, 0, CANOPY_IDLE},   /* nor this */
-        {11, 0, CANOPY_IDLE},  /* nor this */
+        {3, 0, CANOPY_IDLE},  /* never stored */
+        {6, 0, CANOPY_IDLE},  /* nor this */
+        {11, 0, CANOPY_IDLE}, /* nor this */
     };
 
     for (unsigned number = 0; number < sizeof cases / sizeof cases[0]; number++) {
@@ -331,7 +328,8 @@ static void a_snapshot_shows_ten_nodes_and_counts_as_told(void)
     trace();
     memset(status, S, 23);
     trace();
-    TEST_ASSERT_EQUAL_UINT(7, fake.tx_count); /* Tick, Inputs, Snapshot, 20 nodes in 4 frames: 20 to 22 are told already */
+    TEST_ASSERT_EQUAL_UINT(7,
+                           fake.tx_count); /* Tick, Inputs, Snapshot, 20 nodes in 4 frames: 20 to 22 are told already */
     TEST_ASSERT_EQUAL_UINT8(1, frame_of(CANOPY_TRACE_CHANGE, 3)[0] >> 6);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(last, &frame_of(CANOPY_TRACE_SNAPSHOT, 0)[1], 7);
     trace();

@@ -30,7 +30,7 @@ typedef struct {
     canopy_time_t period; /**< [us], > 0. */
     const canopy_tree_t *tree;
     const canopy_bus_t *bus;
-    const canopy_trace_config_t *trace; /**< NULL: no trace. */
+    const canopy_trace_config_t *trace;        /**< NULL: no trace. */
     const canopy_can_acceptance_t *acceptance; /**< What it receives: for the driver's filter. */
     uint32_t rx_max;                           /**< Frames that the bus can carry in one period, > 0. */
     uint32_t frame_us;                         /**< How long the bus takes for a frame of 8 bytes [us], > 0. */

@@ -79,10 +79,10 @@ static inline canopy_status_t canopy_status_now(uint8_t stored)
  * Status codes: 4 bits, docs/trace.md. 0: never ticked. 1..4: canopy_status_t, ticked in this tick. Else one of these plus
  * the last result:
  */
-#define CANOPY_CODE_KEPT 4u         /**< 5..8: not ticked in this tick. */
-#define CANOPY_CODE_RESET 8u        /**< 9..11: ticked in this tick, and reset since. */
+#define CANOPY_CODE_KEPT 4u          /**< 5..8: not ticked in this tick. */
+#define CANOPY_CODE_RESET 8u         /**< 9..11: ticked in this tick, and reset since. */
 #define CANOPY_CODE_RESET_BEFORE 11u /**< 12..14: not ticked in this tick, and reset. */
-#define CANOPY_CODE_NONE 15u        /**< No node. */
+#define CANOPY_CODE_NONE 15u         /**< No node. */
 
 /** The status code of a node. A SKIPPED one has nothing to forget: that it was reset is not told. */
 static inline uint8_t canopy_status_code(uint8_t stored)

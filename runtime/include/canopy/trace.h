@@ -81,13 +81,13 @@ typedef struct {
 
 /** State of the trace of one tree: see canopy_trace_start(). */
 typedef struct {
-    uint8_t *sent;         /**< node_count: the status told last of each node, as canopy_tree_instance_t.status has it. */
-    uint32_t *told;        /**< value_count: the values told last. */
-    uint32_t taken;        /**< canopy_bus_state_t.taken after the tick before. */
-    uint32_t upper;        /**< Bits 24 to 47 of the time of the tick before. */
-    uint16_t next_node;    /**< Where the search for changed nodes begins. */
-    uint16_t next_shown;   /**< Where the next snapshot begins. */
-    uint16_t next_value;   /**< Where the search for changed values begins. */
+    uint8_t *sent;       /**< node_count: the status told last of each node, as canopy_tree_instance_t.status has it. */
+    uint32_t *told;      /**< value_count: the values told last. */
+    uint32_t taken;      /**< canopy_bus_state_t.taken after the tick before. */
+    uint32_t upper;      /**< Bits 24 to 47 of the time of the tick before. */
+    uint16_t next_node;  /**< Where the search for changed nodes begins. */
+    uint16_t next_shown; /**< Where the next snapshot begins. */
+    uint16_t next_value; /**< Where the search for changed values begins. */
     uint16_t next_refresh; /**< The value that is told next though it has not changed. */
     uint16_t snapshot_in;  /**< Ticks until the next snapshot, and so on. */
     uint16_t value_in;
