@@ -159,6 +159,18 @@ def test_several_runs(replay: Callable[..., Result], log: Log) -> None:
     refused(replay(twice, "--run", "3"), "has 2 runs of the controller, and no run 3")
 
 
+def test_the_trace_of_another_tree_plays_no_part(replay: Callable[..., Result], log: Log) -> None:
+    """A second controller on the bus, with trace ids of its own, in other ticks than this one."""
+    other = copy.deepcopy([message for message in log if message.arbitration_id in TRACE])
+    for message in other:
+        message.arbitration_id += 0x10
+    mixed = [message for i, own in enumerate(log) for message in (own, *other[i + 100 : i + 101])]
+    assert len(mixed) > len(log) + 500
+    result = replay(logs.stamped(mixed), "--json")
+    assert result.exit_code == 0, (result.output, result.exception)
+    assert json.loads(result.stdout)["ticks"] == TICKS
+
+
 def test_a_tick_number_that_wraps_around_is_no_start(build_dir: Path, log: Log, tmp_path: Path) -> None:
     """Tick numbers moved so that 0 comes again where the sequence number is 0, too."""
     first, sequence = 100, log[place_of(log, TICK, 100)].data[6]
