@@ -94,7 +94,7 @@ test-differential: # 20,000 random trees against the model and BehaviorTree.CPP,
 
 test-trace: # a million ticks of the trace with losses, for both decoders; in CI 20,000 and 30,000
 	$(call BUILD,host)
-	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} $(PYTEST) --timeout 3600 tests/integration/test_trace.py tests/integration/test_trace_decoders.py
+	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} $(PYTEST) --timeout 3600 tests/integration/test_trace_losses.py tests/integration/test_trace_decoders.py
 
 test-logic: # canopy verify --never and --always: circuits, and what berkeley-abc says of them
 	$(SETUP)/ensure-packages logic
