@@ -137,7 +137,7 @@ void controller_make(controller_t *self, uint64_t seed, const controller_mood_t 
     if (flat > 0) {
         ref_make_flat(&self->ref, flat);
     } else {
-        ref_make(&self->ref, &self->random, NODES_MAX);
+        ref_make(&self->ref, &self->random, random_chance(&self->random, 30) ? NODES_MAX : 200u);
     }
     make_tables(self);
     self->config = (canopy_trace_config_t){

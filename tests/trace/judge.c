@@ -280,6 +280,19 @@ static void judge_sequence(judge_t *self, const uint8_t *data, uint64_t tick)
     self->sent = sequence;
 }
 
+/** CanopyTick's E2E counter: 0 to 14, one more in each tick. (The CRC is looked at by the other decoder.) */
+static void judge_guard(judge_t *self, const uint8_t *data)
+{
+    uint8_t counter = data[1] & 0x0Fu;
+
+    if (self->controller->config.data_id == CANOPY_E2E_NONE) {
+        CHECK(counter == 0 && data[0] == 0);
+    } else {
+        CHECK(self->has_sent ? counter == (self->counter + 1u) % 15u : counter < 15u);
+    }
+    self->counter = counter;
+}
+
 void judge_tick(judge_t *self)
 {
     const controller_t *controller = self->controller;
@@ -299,6 +312,9 @@ void judge_tick(judge_t *self)
         bool has_sequence = message == 0 || message == 3u || message == 4u;
 
         self->tally->frames++;
+        if (message == 0 && controller->mood.bus_frames == 0) {
+            judge_guard(self, frame.data);
+        }
         if (has_sequence && controller->mood.bus_frames == 0) {
             judge_sequence(self, &frame.data[message == 0 ? 6 : 0], tick);
         }

@@ -58,6 +58,7 @@ typedef struct {
     uint32_t dropped; /**< By the controller, so far. */
     bool has_sent;
     uint8_t sent;        /**< Sequence of the controller's last frame that has one. */
+    uint8_t counter;     /**< E2E counter of its last CanopyTick. */
     uint64_t lost_since; /**< Frames with a Sequence that the channel has lost since the last CanopyTick that came, */
     uint64_t lost_told;  /**< and before it, as far as a receiver can know. */
     bool is_lost_less;   /**< 64 and more at once: Sequence shows less. */
