@@ -238,8 +238,9 @@ class _Reader:
         if data.get("scale") is None:
             return Fraction(1)
         text = self._get(data, place, "scale", str)
-        if re.fullmatch(r"[1-9]\d{0,18}(/[1-9]\d{0,18})?", text) is None:
-            raise self._error(f"{place}scale", f"is '{text[:50]}', must be a fraction such as 1/100")
+        number = re.fullmatch(r"\d{1,19}([.]\d{1,19}|/[1-9]\d{0,18})?", text)
+        if number is None or not Fraction(text):
+            raise self._error(f"{place}scale", f"is '{text[:50]}', must be a number such as 0.01 or 1/3")
         return Fraction(text)
 
     def _name(self, value: Any, place: str) -> str:

@@ -114,6 +114,8 @@ class TraceDecoder:
         """Of the last tick every known code was certain, and none has changed since."""
         self._slots = Slots(model.trace)
         self._tick: OpenTick | None = None
+        self._newest: OpenTick | None = None
+        """The tick at hand, or one that is over without a stray frame."""
         self._last_tick: int | None = None
         self._sequence: int | None = None
         self._gap = 0  # lost frames since the last CanopyTick; counted when the next one shows that this was no restart
@@ -186,7 +188,7 @@ class TraceDecoder:
             self._know_the_start()
         self._gap = 0
         self._slots.begin()
-        self._tick = OpenTick(self._last_tick, frame)
+        self._tick = self._newest = OpenTick(self._last_tick, frame)
         return views
 
     def _advance(self, last: int, frame: TickFrame) -> None:
@@ -229,9 +231,9 @@ class TraceDecoder:
         frame = ArrivalsFrame.read(data)
         if frame is None:
             return self._refuse()
-        if self._tick is None or not self._tick.expects_arrivals(frame):
+        if self._newest is None or not self._newest.may_have(frame):
             return self._take_foreign(None)
-        self._tick.take_arrivals(frame)
+        self._newest.take_arrivals(frame)
         return ()
 
     def _take_snapshot(self, data: bytes) -> Views:
@@ -281,6 +283,7 @@ class TraceDecoder:
     def _take_foreign(self, sequence: int | None) -> Views:
         """A frame of a tick whose CanopyTick was lost. So the one at hand is over."""
         views = self._finish()
+        self._newest = None
         if sequence is not None:
             self._follow(sequence)
         self._forget_codes()

@@ -85,7 +85,9 @@ def remove(*place: str | int) -> Callable[[Any], None]:
         (change("trace", "values", 0, "kind", to="port"), "trace.values[0].kind: is 'port', must be entry or reason"),
         (change("trace", "values", 3, "node", to=4), "trace.values[3].node: is 4, must be 0 to 3"),
         (change("trace", "values", 3, "enum", to={"a": "b"}), "trace.values[3].enum.a: is 'b', must be of type int"),
-        (change("trace", "values", 2, "scale", to="1/0"), "trace.values[2].scale: is '1/0', must be a fraction"),
+        (change("trace", "values", 2, "scale", to="1/0"), "trace.values[2].scale: is '1/0', must be a number such as"),
+        (change("trace", "values", 2, "scale", to="0.0"), "trace.values[2].scale: is '0.0', must be a number such as"),
+        (change("trace", "values", 2, "scale", to="1e9"), "trace.values[2].scale: is '1e9', must be a number such as"),
         (change("bus", "dbc", to="other.dbc"), "other.dbc is not there"),
     ],
 )

@@ -155,7 +155,7 @@ def test_the_state_of_the_bus_and_the_counters_are_shown(tmp_path: Path) -> None
     watch, source = Watch(load_model(write_model(tmp_path))), TraceSource(4)
 
     def feed(*frames: tuple[int, bytes], **inputs: int) -> tuple[str, dict[str, Any]]:
-        for frame in (*frames, *source.frames([1, 3, 1, 9], **inputs)):
+        for frame in (*frames, *source.frames([1, 3, 1, 9], values=(), **inputs)):
             watch.feed(*frame, 1.0)
         return line(watch, 1.0), watch.snapshot(1.0)
 

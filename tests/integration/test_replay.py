@@ -425,7 +425,7 @@ def test_a_log_of_two_buses(replay: Callable[..., Result], log: Log) -> None:
 def test_a_log_of_an_older_version_is_refused_with_a_way_out(replay: Callable[..., Result], log: Log) -> None:
     for message in log:
         if message.arbitration_id == TICK:  # Sequence, Tick, RootStatus, Changes, Overruns
-            message.data = bytes([message.data[6] & 0x3F, *message.data[2:6], message.data[7] & 7, 0, 0])
+            message.data = bytearray([message.data[6] & 0x3F, *message.data[2:6], message.data[7] & 7, 0, 0])
     place = next(i for i, m in enumerate(log) if m.arbitration_id == TICK)
     refused(
         replay(log),

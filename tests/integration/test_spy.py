@@ -15,7 +15,7 @@ from typing import Any
 import lcm
 import pytest
 
-from canopy.bridge import status_message, structure_message
+from canopy.live.lcm_messages import status_message, structure_message
 from canopy.model import load_model
 from canopy.spy import find_jar
 from canopy.trace import TraceDecoder

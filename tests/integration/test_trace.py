@@ -18,7 +18,7 @@ from integration.trace_source import IDS, NUMBERS, SLOTS, TEXTS, VALUES, Frame, 
 SIZES = (1, 4, 10, 11, 35, 150)
 UNKNOWN = -1
 TICKS = int(os.environ.get("CANOPY_TRACE_TICKS", "20000"))
-"""For each share of losses; `make trace-losses` takes more."""
+"""For each share of losses; `make test-trace` takes more."""
 
 
 @pytest.fixture(scope="module")

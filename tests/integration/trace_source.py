@@ -137,7 +137,7 @@ VALUES: list[dict[str, Any]] = [
         "type": "int16_t",
         "slot": 3,
         "slots": 1,
-        "scale": "1/10",
+        "scale": "0.1",
         "unit": "°C",
     },
     {

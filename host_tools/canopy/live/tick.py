@@ -29,7 +29,6 @@ class OpenTick:
         self._place = 0
         """Of the last frame about nodes: how many numbers behind CanopyTick's."""
         self._inputs_left = True
-        self._has_inputs = False
         self._arrivals_left = False
         self._snapshot_left = frame.has_snapshot
         self._changes_left = frame.has_changes
@@ -62,17 +61,16 @@ class OpenTick:
 
     def take_inputs(self, has_more_ages: bool) -> None:
         """CanopyInputs has come."""
-        self._inputs_left, self._has_inputs, self._arrivals_left = False, True, has_more_ages
+        self._inputs_left, self._arrivals_left = False, has_more_ages
 
-    def expects_arrivals(self, frame: ArrivalsFrame) -> bool:
-        """Can it be this tick's? It tells nothing when CanopyInputs is missing."""
-        begun = self.told or self._has_values
-        return frame.tick == self.number % 16 and not begun and (self._arrivals_left or not self._has_inputs)
+    def may_have(self, frame: ArrivalsFrame) -> bool:
+        """Is it this tick's, whether or not CanopyInputs has announced it? Also when the tick is over."""
+        return frame.tick == self.number % 16 and not self.told and not self._has_values
 
     def take_arrivals(self, frame: ArrivalsFrame) -> None:
         """Notes what comes behind it, when it is this tick's."""
         self._inputs_left = False
-        self._arrivals_left = self._has_inputs and not frame.is_last
+        self._arrivals_left &= not frame.is_last
 
     def expects_snapshot(self, frame: SnapshotFrame) -> bool:
         """Is it this tick's? Then its number is the next one behind CanopyTick's."""

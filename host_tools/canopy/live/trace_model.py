@@ -48,7 +48,7 @@ class TraceValue:
     """"entry" or "reason"."""
     name: str
     path: str
-    """Of the entry's scope, e.g. "arm/gripper"; "" for the main tree's."""
+    """Of the entry's scope, e.g. "arm/gripper"; "" for the main tree's. Of a reason: of its node."""
     node: int | None
     """Of a reason: whose."""
     type: str
@@ -68,8 +68,8 @@ class TraceValue:
 
     @property
     def title(self) -> str:
-        """Its name with its scope's before it."""
-        return f"{self.path}/{self.name}" if self.path else self.name
+        """The entry's name with its scope before it; of a reason the node's path."""
+        return (self.path if self.kind == "reason" else f"{self.path}/{self.name}") if self.path else self.name
 
 
 @dataclass(frozen=True)
