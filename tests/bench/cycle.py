@@ -114,7 +114,17 @@ def generate(application: Application, folder: Path) -> Path:
     """The application in C, and frames.c; returns the folder with all that."""
     out = folder / application.name
     tree, dbc = application.folder / "trees" / application.tree, application.folder / application.dbc
-    options = ("--node", "Controller", "--period-ms", "50", "--trace", "0x600", "--name", application.name, *application.options)
+    options = (
+        "--node",
+        "Controller",
+        "--period-ms",
+        "50",
+        "--trace",
+        "0x600",
+        "--name",
+        application.name,
+        *application.options,
+    )
     build.run(*image.CANOPY, "compile", tree, "--dbc", dbc, *options, "-o", out)
     (out / "frames.c").write_text(_frames(application), encoding="utf-8")
     return out

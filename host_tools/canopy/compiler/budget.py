@@ -223,7 +223,10 @@ def make_budget(
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     images = images or ImageCost()
     ram = ram_bytes(table, bus, images, trace)
-    loads = tuple(trace.load_percent(period_ms, bitrate, worst=worst) for worst in (False, True)) if trace else None
+    loads = None
+    if trace is not None:
+        idle, most = (trace.load_percent(period_ms, bitrate, worst=worst) for worst in (False, True))
+        loads = (idle, most)
     return Budget(
         ram_bytes=ram,
         flash_bytes=flash_bytes(table, bus, trace) + images.tables,

@@ -200,7 +200,8 @@ class Message:
 class Bus:
     """The bus as `node` sees it. `load` lists (frame length, extended, fd, cycle ms) of every cyclic message on it.
 
-    `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `source` is the file as it was read.
+    `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `source` is the file as it was
+    read.
     """
 
     path: Path

@@ -128,7 +128,8 @@ def _check_no_trace(dbc: Dbc, message: Any, node: str) -> None:
         raise CompileError(
             dbc.text.message(message),
             f"node '{node}' sends '{message.name}', and the trace's messages are made by the compiler",
-            "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600); any eight free ids do",
+            "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600), or another id "
+            "that begins eight free ones",
         )
 
 

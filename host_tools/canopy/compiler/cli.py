@@ -38,13 +38,12 @@ def _print_costs(budget: Budget) -> None:
 def _print_trace(budget: Budget, trace: Trace) -> None:
     idle, worst = budget.trace_load_percent or (0.0, 0.0)
     values = f", {len(trace.values)} values" if trace.values else ""
-    echo(f"  trace  {idle:6.2f} % of the bus while nothing changes, {worst:.2f} % at most; {budget.trace_ram_bytes} bytes of RAM")
+    load = f"{idle:6.2f} % of the bus while nothing changes, {worst:.2f} % at most"
+    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM")
     echo(f"         {trace.nodes} nodes{values}, all known within {trace.known_within_ms} ms")
 
 
-def _print_budget(
-    name: str, budget: Budget, trace: Trace | None, max_ram: int | None, max_flash: int | None
-) -> None:
+def _print_budget(name: str, budget: Budget, trace: Trace | None, max_ram: int | None, max_flash: int | None) -> None:
     def limit(value: int | None) -> str:
         return f" of {value}" if value is not None else ""
 
@@ -52,7 +51,8 @@ def _print_budget(
     echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
     echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
     echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
-    echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC{' and the trace' if trace else ''}")
+    what = "every cyclic message of the DBC" + (" and the trace" if trace is not None else "")
+    echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, {what}")
     if trace is not None:
         _print_trace(budget, trace)
     _print_bounds(budget.bounds)
@@ -115,7 +115,7 @@ def type_options(command: _Command) -> _Command:
     return command
 
 
-class HexNumber(click.ParamType):
+class HexNumber(click.ParamType[int]):
     """A number that may be written with 0x."""
 
     name = "number"
@@ -138,7 +138,11 @@ class HexNumber(click.ParamType):
 def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOptions | None:
     if base is None:
         if guard is not None or entries != "all":
-            raise CompileError(Place("--trace-guard" if guard is not None else "--trace-entries"), "needs --trace", "for example --trace 0x600")
+            raise CompileError(
+                Place("--trace-guard" if guard is not None else "--trace-entries"),
+                "needs --trace",
+                "for example --trace 0x600",
+            )
         return None
     return TraceOptions(base, guard, entries)
 
@@ -230,7 +234,13 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
     type=click.IntRange(0, 1_000_000),
     help="From a free mailbox to its next frame.",
 )
-@click.option("--trace", "trace_base", type=HexNumber(0, 0x1FFFFFF8), metavar="ID", help="Send the trace, with eight ids from this one on.")
+@click.option(
+    "--trace",
+    "trace_base",
+    type=HexNumber(0, 0x1FFFFFF8),
+    metavar="ID",
+    help="Send the trace, with eight ids from this one on.",
+)
 @click.option(
     "--trace-entries",
     default="all",
@@ -238,7 +248,9 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
     type=click.Choice(["all", "marked", "none"]),
     help='Entries that the trace tells; marked: those of nodes with _trace="yes".',
 )
-@click.option("--trace-guard", type=HexNumber(0, 0xFFFF), metavar="DATA_ID", help="Protect CanopyTick by E2E Profile 11.")
+@click.option(
+    "--trace-guard", type=HexNumber(0, 0xFFFF), metavar="DATA_ID", help="Protect CanopyTick by E2E Profile 11."
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -275,8 +287,8 @@ def command(
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
 
     Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), NAME_bus.c and NAME_bus.h (the bus and its codec),
-    and NAME.model.json for the tools; with --trace also NAME_trace.dbc, for other tools. Nothing is written when anything is wrong. Exit status: 0 done, 2 the input
-    cannot be compiled.
+    and NAME.model.json for the tools; with --trace also NAME_trace.dbc, for other tools. Nothing is written when
+    anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
 
     \b
     Example:

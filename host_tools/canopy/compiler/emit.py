@@ -129,8 +129,9 @@ def load_application(
     others: Others | None = None,
     trace: TraceOptions | None = None,
 ) -> Application:
-    """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
-    `trace`: None: without.
+    """Reads and checks everything.
+
+    `images`: nodes, and uses of each kind, of the largest tree image; None: no images. `trace`: None: without.
 
     Raises:
         CompileError: something in the tree, in the DBC, or between them cannot be compiled.
@@ -301,7 +302,11 @@ def render(application: Application) -> dict[str, bytes]:
     }
     traced = application.trace
     return {
-        **({f"{name}_trace.dbc": trace_dbc(traced.base, traced.extended, application.bus.node).encode()} if traced else {}),
+        **(
+            {f"{name}_trace.dbc": trace_dbc(traced.base, traced.extended, application.bus.node).encode()}
+            if traced
+            else {}
+        ),
         application.bus.path.name: read_dbc(application.bus.path),
         f"{name}.model.json": (dumps(model(application), indent=1) + "\n").encode(),
         **tie(files),

@@ -214,7 +214,9 @@ def _reasons(draft: _Draft, leaf_id: str, kind: str) -> tuple[str, ...]:
     if reasons and kind in INNER_KINDS:
         raise CompileError(place, f"'{leaf_id}' is a {kind}, and only conditions and actions have reasons")
     if len(reasons) > REASONS_MAX:
-        raise CompileError(place, f"'{leaf_id}' has {len(reasons)} reasons", f"{REASONS_MAX} at most: they are one byte")
+        raise CompileError(
+            place, f"'{leaf_id}' has {len(reasons)} reasons", f"{REASONS_MAX} at most: they are one byte"
+        )
     return reasons
 
 

@@ -124,7 +124,7 @@ class Trace:
 
     @property
     def frames_max(self) -> int:
-        """Most trace frames of one tick: CanopyTick, CanopyInputs, CanopySnapshot, CanopyHealth, both CanopyModel, …"""
+        """Most trace frames of one tick: six of one kind each (two of CanopyModel), and what varies."""
         return 6 + self.arrivals_max + self.changes_max + self.values_max
 
     def frames_a_second(self, period_ms: int, *, worst: bool) -> float:
@@ -184,7 +184,7 @@ def _entry(entry: Entry, slot: int) -> TracedValue | None:
 
 def _reasons(table: Table, slot: int) -> list[TracedValue]:
     places = {id(row.node): index for index, row in enumerate(table.rows)}
-    result = []
+    result: list[TracedValue] = []
     for use in table.leaves:
         for number, node in enumerate(use.nodes if use.leaf.reasons else ()):
             result.append(
@@ -224,12 +224,15 @@ def _check_ids(bus: Bus, base: int, extended: bool) -> None:
     place = Place("--trace")
     last = base + len(IDS) - 1
     if last > (0x1FFFFFFF if extended else 0x7FF):
-        raise CompileError(place, f"the trace takes the ids 0x{base:X} to 0x{last:X}, which are no CAN ids", "take lower ones")
+        raise CompileError(
+            place, f"the trace takes the ids 0x{base:X} to 0x{last:X}, which are no CAN ids", "take lower ones"
+        )
     for message in bus.source.database.messages:
         if message.is_extended_frame == extended and base <= message.frame_id <= last:
             raise CompileError(
                 place,
-                f"the trace takes the ids 0x{base:X} to 0x{last:X}, and 0x{message.frame_id:X} is '{message.name}' of {bus.path.name}",
+                f"the trace takes the ids 0x{base:X} to 0x{last:X}, and 0x{message.frame_id:X} is '{message.name}' of "
+                f"{bus.path.name}",
                 "take eight ids in a row that are free, with higher numbers than all that is urgent",
             )
 
