@@ -162,7 +162,9 @@ void controller_start(controller_t *self, uint32_t number)
     const canopy_tx_memory_t memory = {.trace = self->ring, .trace_capacity = RING};
 
     ref_start(&self->ref);
-    memset(&self->state, 0, sizeof self->state);
+    memset(&self->state, 0xA5, sizeof self->state); /* of the run before */
+    memset(self->sent, 0xA5, sizeof self->sent);
+    memset(self->told, 0xA5, sizeof self->told);
     memset(self->rx, 0, sizeof self->rx);
     self->state.sent = self->sent;
     self->state.told = self->told;

@@ -312,6 +312,9 @@ void judge_tick(judge_t *self)
         bool has_sequence = message == 0 || message == 3u || message == 4u;
 
         self->tally->frames++;
+        for (unsigned byte = message == 2u ? 1u + (frame.data[0] >> 4 & 7u) : 8u; byte < 8u; byte++) {
+            CHECK(frame.data[byte] == 0); /* not used by CanopyArrivals */
+        }
         if (message == 0 && controller->mood.bus_frames == 0) {
             judge_guard(self, frame.data);
         }
