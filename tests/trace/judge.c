@@ -175,10 +175,6 @@ static void show(void *context, const decoder_t *decoder)
     }
     judge_inputs(self, truth);
     judge_whole(self, truth);
-    for (uint16_t i = 0; i < self->model.node_count; i++) {
-        self->tally->since_exact += self->nodes[i].is_certain && self->nodes[i].is_since_exact ? 1u : 0u;
-        self->tally->since_open += self->nodes[i].is_certain && !self->nodes[i].is_since_exact ? 1u : 0u;
-    }
     self->has_shown = true;
     self->last_shown = self->tick;
     self->tally->shown++;

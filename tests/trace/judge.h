@@ -29,7 +29,6 @@ typedef struct {
     uint64_t wrong; /**< Shown as certain; with judge_t.only_counts. Else one ends the program. */
     uint64_t nodes_certain, nodes_old, nodes_unknown;
     uint64_t slots_certain, slots_old, slots_unknown;
-    uint64_t since_exact, since_open;
     uint64_t inputs;
     uint32_t known_after; /**< Most ticks from a loss until all nodes and slots were known. */
     uint32_t promised;    /**< Of that controller. */
