@@ -129,7 +129,7 @@ def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tu
             raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
 
 
-WITH_MODEL = ("model", "dbc", "node", "names", "solver", "folder", "checked_folder", "handover")
+WITH_MODEL = ("model", "names", "solver", "folder", "checked_folder", "handover")
 
 
 def _logic_usage(asked: bool, period: int | None) -> None:
@@ -155,7 +155,7 @@ def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json
 @click.command()
 @click.argument("tree", metavar="TREE", type=click.Path(path_type=Path))
 @click.option("--model", type=click.Path(path_type=Path), help="The model. [default: NAME.plant.toml beside the tree]")
-@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: signals and units of the model are checked.")
+@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: checks the model's signals and units.")
 @click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
 @type_options
 @click.option("--claim", "names", multiple=True, metavar="NAME", help="Only this claim; may be given several times.")
@@ -206,8 +206,8 @@ def command(
     A certificate has the numbers that show a claim of the kinds reaches and avoids. --check judges them again with a
     small program that has no solver, and that reads tree and model by itself.
 
-    --never and --always need no model: they ask about the statuses of nodes, now and in the past, for any answers that
-    the leaves declare. They need the program berkeley-abc.
+    --never and --always need no model: they ask about nodes, entries and signals, now and in the past, for any answers
+    that the leaves declare and any messages. They need the program berkeley-abc, and --dbc and --node to know signals.
 
     Exit status: 0 all came out as the model file expects, and all questions are proven, 1 one did not, a solver
     disagrees, or a certificate is rejected, 2 wrong input.
@@ -231,8 +231,8 @@ def command(
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         if questions:
-            code = logic.run(tree, questions, options, period_ms=period, timeout=timeout, whole=whole, json_=json_)
-            sys.exit(code)
+            how = logic.How(dbc, node or "", period, timeout, whole, json_)
+            sys.exit(logic.run(tree, questions, options, how))
         subject = load(tree, model or model_path(tree), dbc, node or "", options)
         for claim in chosen(subject, names):
             result = verify(subject, claim, timeout)
