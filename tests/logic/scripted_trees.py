@@ -55,6 +55,7 @@ class Writer:
             f"b := {self._chance.randint(-3, 9)}",
             "b += 1",
             "b := b * 3 - a",
+            "b := b * 1000 - a",
             "b := Desk.Wanted",
             "f := b > 2",
             "t := (f ? 'x' : 'y')",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -38,6 +38,8 @@ class Result:
     steps: list[str] = field(default_factory=list)
     seconds: float = 0.0
     bound: Fraction | None = None
+    endless: bool = False
+    """Refuted by a run that never ends, of which the trace shows the beginning."""
 
     @property
     def expected(self) -> bool:
@@ -59,9 +61,22 @@ def decide(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree, seconds:
         "margin": _margin,
         "dwell": _dwell,
     }
-    result = methods[claim.kind](ask(claim, plant, reader, tree, seconds))
+    question = ask(claim, plant, reader, tree, seconds)
+    result = _checked(question, methods[claim.kind](question))
     result.seconds = time.monotonic() - begin
     return result
+
+
+def _checked(question: Question, result: Result) -> Result:
+    """What refutes a claim about old measurements has to be a run in which each of them is one of the past."""
+    sensing = question.sensing
+    if sensing is None or sensing.is_exact or result.verdict != "refuted":
+        return result
+    can_happen = bool(result.trace) and not result.endless
+    if can_happen and sensing.explains(result.trace, question.measured, question.system.domain):
+        return result
+    text = f"{result.text}; that may need older measurements than there are"
+    return replace(result, verdict="unknown", text=text)
 
 
 def _reaches(question: Question) -> Result:
@@ -74,7 +89,7 @@ def _reaches(question: Question) -> Result:
     if worst is None:
         return Result(claim, "proven", "every start is at the goal", "one step", bound=Fraction(0))
     if not worst.ended and not worst.cut:
-        return Result(claim, "refuted", f"this run never ends: {worst.why}", "simulation", worst.visits)
+        return Result(claim, "refuted", f"this run never ends: {worst.why}", "simulation", worst.visits, endless=True)
     least = len(worst.visits) - 1
     if within is not None and least > within:
         text = f"from {question.plant.shown(worst.visits[0].state)} it takes {least} steps"
@@ -106,7 +121,7 @@ def _unrolled(question: Question, found: Found, within: int | None) -> Result:
         text = f"within {found.steps} steps, and as many are needed"
         return Result(claim, "proven", text, "unrolling", found.trace, steps, bound=Fraction(found.steps))
     if found.endless:
-        return Result(claim, "refuted", f"from {shown} some run never ends", "unrolling", found.trace)
+        return Result(claim, "refuted", f"from {shown} some run never ends", "unrolling", found.trace, endless=True)
     return Result(claim, "unknown", f"no bound found, and no run longer than {found.steps}: {found.note}", "unrolling")
 
 
