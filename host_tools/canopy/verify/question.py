@@ -180,7 +180,7 @@ def ask(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree, seconds: fl
     start = everything(plant.width)
     if "from" in options:
         start = reader.formula(options["from"], (*path, "from"), f"from of '{claim.name}'")
-    start = start & Formula(plant.width, (plant.domain,))
+    start = start & Formula(plant.width, (plant.declared,))
     if start.is_empty:
         raise CompileError(claim.place, f"claim '{claim.name}' starts from no state of the state space")
     system = System(made, plant.domain)

@@ -64,9 +64,9 @@ class Sensing:
             moved = _moved(made, [domain] * len(made))
             for _ in range(REFINEMENTS):
                 boxes = self._boxes(moved)
-                moved = _moved(made, [widened(piece.states, domain, boxes) for piece in made])
+                moved = _moved(made, [_widened(piece, domain, boxes) for piece in made])
             boxes = self._boxes(moved)
-        return [replace(piece, states=widened(piece.states, domain, boxes)) for piece in made]
+        return [replace(piece, states=_widened(piece, domain, boxes)) for piece in made]
 
     def _boxes(self, moved: Sequence[Interval]) -> list[Interval]:
         """What a measurement may differ by: its error, and what the plant has moved since."""
@@ -81,7 +81,7 @@ class Sensing:
 
         Before its start the plant is taken to have stood still.
         """
-        measured = [widened(piece.states, domain, self.error) for piece in made]
+        measured = [widened(piece.seen or piece.states, domain, self.error) for piece in made]
         for moment, visit in enumerate(visits[:-1]):
             places = [
                 place for place, piece in enumerate(made) if (piece.label, piece.status) == (visit.label, visit.status)
@@ -101,6 +101,12 @@ class Sensing:
         return [
             tuple(visits[moment - age].state[index] for index, age in enumerate(chosen)) for chosen in product(*ages)
         ]
+
+
+def _widened(piece: Piece, domain: Polyhedron, boxes: Sequence[Interval]) -> Polyhedron:
+    """The states in which the piece may be measured, and in which the plant does what it does there."""
+    states = widened(piece.seen or piece.states, domain, boxes)
+    return states if piece.where is None else states.meet(piece.where)
 
 
 def _moved(made: Sequence[Piece], where: Sequence[Polyhedron]) -> list[Interval]:
