@@ -25,8 +25,18 @@ KEYS = {
     "avoids": (*COMMON, "from", "avoid"),
     "margin": (*COMMON, "inside", "avoid", "at_least"),
     "dwell": (*COMMON, "from", "at_least"),
+    "invariant": (*COMMON, "from", "holds", "avoid"),
+    "border": ("name", "kind", "of", "arbitrary", "disturbance", "expect", "inside"),
 }
-NEEDED = {"reaches": (), "stays": (), "avoids": ("avoid",), "margin": ("inside", "avoid"), "dwell": ("at_least",)}
+NEEDED = {
+    "reaches": (),
+    "stays": (),
+    "avoids": ("avoid",),
+    "margin": ("inside", "avoid"),
+    "dwell": ("at_least",),
+    "invariant": ("holds",),
+    "border": (),
+}
 
 
 @dataclass(frozen=True)

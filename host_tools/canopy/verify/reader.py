@@ -30,7 +30,7 @@ ELSE = "else"
 VARIABLE_KEYS = ("unit", "range", "signal", "meaning")
 LEAF_KEYS = ("success", "running", "failure", "modes", "free")
 MODE_KEYS = ("name", "when", "where", "next", "disturbance", "shorter_than", "writes")
-CLAIM_KINDS = ("reaches", "stays", "avoids", "margin", "dwell")
+CLAIM_KINDS = ("reaches", "stays", "avoids", "margin", "dwell", "invariant", "border")
 
 
 class ModelReader:
