@@ -25,8 +25,10 @@ _DRIVE = """
 void logic_begin(void)
 {
     (void)memset(&memory, 0, sizeof memory);
-    START;
-    (void)canopy_tree_init(&memory.tree, &tree, memory.status, memory.words, &memory);
+    if (t_app.start != NULL) {
+        t_app.start(&memory);
+    }
+    (void)canopy_tree_init(&memory.tree, t_app.tree, (uint8_t *)memory.status, memory.words, &memory);
 }
 
 void logic_tick(const int64_t *in, uint64_t now, uint8_t *status, int64_t *entries)
@@ -34,7 +36,9 @@ void logic_tick(const int64_t *in, uint64_t now, uint8_t *status, int64_t *entri
     given = in;
     SIGNALS
     (void)canopy_tree_tick(&memory.tree, now);
-    (void)memcpy(status, memory.status, sizeof memory.status);
+    for (uint16_t node = 0; node < T_NODES; node++) {
+        status[node] = (uint8_t)canopy_tree_status(&memory.tree, node);
+    }
     ENTRIES
 }
 
@@ -59,7 +63,7 @@ class Compiled:
         arguments = [str(path), "--name", "t", "--dbc", str(dbc), "--node", NODE, "--period-ms", "10"]
         result = CliRunner().invoke(main, ["compile", *arguments, "-o", str(folder)])
         assert result.exit_code == 0, result.output
-        (folder / "drive.c").write_text(self._source((folder / "t_app.c").read_text()))
+        (folder / "drive.c").write_text(self._source())
         sources = [folder / "drive.c", folder / "t_bus.c", *sorted((RUNTIME / "src").glob("*.c"))]
         compiler = [*shlex.split(os.environ.get("CC", "cc")), "-std=c11", "-O0", "-shared", "-fPIC"]
         library = folder / f"{path.stem}_{os.getpid()}_{id(self)}.so"
@@ -81,7 +85,7 @@ class Compiled:
                     found.append((f"?{message.name}.{signal.name}", f"{message.c_name}.{signal.has_name}"))
         return found
 
-    def _source(self, application: str) -> str:
+    def _source(self) -> str:
         leaves = []
         for number, node in enumerate(self._nodes):
             if node.leaf is None:
@@ -104,8 +108,7 @@ class Compiled:
         signals = [f"memory.input.{name} = (bool)in[{first + i}];" for i, (_, name) in enumerate(self._names)]
         signals = [line if _is_flag(line) else line.replace("(bool)", "") for line in signals]
         entries = [f"entries[{i}] = memory.entries.{one.c_name};" for i, one in enumerate(self._board.entries)]
-        start = "start(&memory)" if "static void start(" in application else "(void)0"
-        drive = _DRIVE.replace("START", start).replace("SIGNALS", "\n    ".join(signals))
+        drive = _DRIVE.replace("SIGNALS", "\n    ".join(signals))
         head = '#include <string.h>\n#include "t_app.c"\nstatic const int64_t *given;\n'
         return head + "\n".join(leaves) + drive.replace("ENTRIES", "\n    ".join(entries))
 
@@ -114,7 +117,7 @@ class Compiled:
         self._library.logic_begin()
 
     def tick(self, inputs: Inputs, now_us: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """One tick: the status code of each node, and what each entry holds, in steps."""
+        """One tick: the status of each node, and what each entry holds, in steps."""
         given = [0] * (self._slots[-1] + len(self._names))
         for number, answer in inputs.answers.items():
             given[self._slots[number]] = answer

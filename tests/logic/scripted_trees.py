@@ -30,7 +30,7 @@ class Writer:
         roll = self._chance.random()
         if depth == 0 or roll < 0.4:
             names = (*NUMBERS, "o") if self._open else NUMBERS
-            return self._pick(*names, *names, "f", str(self._chance.randint(0, 9)), "2.5", *SIGNALS)
+            return self._pick(*names, *names, "f", str(self._chance.randint(0, 9)), "2.5", "(7 / 2 * 2)", *SIGNALS)
         if roll < 0.8:
             return f"({self._number(depth - 1)} {self._pick('+', '-', '*')} {self._number(depth - 1)})"
         if roll < 0.9:
@@ -61,6 +61,8 @@ class Writer:
             "t := (f ? 'x' : 'y')",
             f"b := ({self.condition(1)}) ? 1 : b; f := !f",
             "b := b | 5",
+            "b := 3 * (b + 1) - 7 / 2 * 4",
+            "b := -(1 / 4) * 8 + b",
         )
 
     # Nodes

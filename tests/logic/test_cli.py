@@ -15,6 +15,7 @@ from logic.bus import NODE, write_dbc
 from logic.large import document, large_tree
 
 pytestmark = pytest.mark.logic
+ROOT = Path(__file__).parents[2]
 WORK = '<Sequence><Act name="first"/><Act name="Go home"/></Sequence>'
 BODY = f'<ReactiveFallback><ReactiveSequence><Check/><Do name="fan"/></ReactiveSequence>{WORK}</ReactiveFallback>'
 
@@ -238,6 +239,32 @@ def test_what_has_no_circuit_may_return_anything(tmp_path: Path) -> None:
     below = asked(tmp_path, body, "--never", "RUNNING(a)")
     assert below.exit_code == 2
     assert "nothing is known of 'a': it lies below T/try" in below.output
+
+
+POSE = "geometry_msgs::msg::PoseStamped_<std::allocator<void>>=pose_t"
+PATH = "nav_msgs::msg::Path_<std::allocator<void>>=path_t"
+
+
+@pytest.mark.parametrize(
+    ("tree", "dbc", "options", "runs"),
+    [
+        ("tests/unit/language/main.xml", "tests/unit/language/language.dbc", ["--include", "state.h"], "unknown"),
+        (
+            "examples/courier/trees/courier.xml",
+            "examples/courier/courier.dbc",
+            ["--include", "courier_types.h", "--type-map", POSE, "--type-map", PATH],
+            "refuted",
+        ),
+    ],
+)
+def test_applications(tree: str, dbc: str, options: list[str], runs: str) -> None:
+    """Queues, texts, numbers from entries, constants that are fractions on the way, control nodes of one's own."""
+    bus = ["--dbc", str(ROOT / dbc), "--node", NODE, "--period", "10"]
+    questions = ["--never", "RUNNING(root) and FAILURE(root)", "--never", "HALTED(root)", "--never", "RUNNING(root)"]
+    result = CliRunner().invoke(command, [str(ROOT / tree), *bus, *options, *questions])
+    assert result.exit_code == 1
+    verdicts = [line.split()[0] for line in result.output.splitlines() if " never " in line[:16]]
+    assert verdicts == ["proven", "proven", runs]
 
 
 def test_options_that_do_not_go_together(tmp_path: Path) -> None:

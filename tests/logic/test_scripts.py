@@ -12,7 +12,6 @@ import pytest
 from canopy.compiler.bus_reader import read_bus
 from canopy.compiler.errors import CompileError
 from canopy.compiler.tree_reader import read_tree
-from canopy.semantics.spec import IDLE, WAS
 from canopy.verify.expression import ExpressionError
 from canopy.verify.logic.ask import ask
 from canopy.verify.logic.encode import Encoding
@@ -43,13 +42,13 @@ def logic_tree(folder: Path, seed: str, *, is_open: bool) -> LogicTree | None:
 
 @pytest.mark.parametrize("is_open", [False, True], ids=["followed", "open"])
 def test_circuits_are_plain_arithmetic(tmp_path: Path, is_open: bool) -> None:
-    compared = seen_entries = 0
+    compared = seen_entries = assumed = 0
     for number in range(4 * TREES):
         tree = logic_tree(tmp_path, f"{SEED}/{number}", is_open=is_open)
         if tree is None:
             continue
         encoding = Encoding(tree.spec(), tree.returns, PERIOD_US, tree.board)
-        assert is_open or not encoding.scripts.assumed
+        assumed += bool(encoding.scripts.assumed)
         chance = random.Random(number)
         given = [{one: chance.random() < 0.5 for one in encoding.circuit.inputs} for _ in range(TICKS)]
         inputs, expected = from_circuit(encoding, given)
@@ -61,6 +60,7 @@ def test_circuits_are_plain_arithmetic(tmp_path: Path, is_open: bool) -> None:
         if compared >= TREES:
             break
     assert compared >= TREES
+    assert assumed > TREES // 2 if is_open else assumed < TREES // 20  # products of large numbers
     assert seen_entries > TREES * TICKS // 2
 
 
@@ -68,10 +68,9 @@ def run_compiled(compiled: Compiled, inputs: Sequence[Inputs], expected: Sequenc
     """Statuses and entries of the compiled tree are those of a trace, tick by tick."""
     compiled.begin()
     for tick, (one, shot) in enumerate(zip(inputs, expected, strict=True)):
-        codes, entries = compiled.tick(one, tick * PERIOD_US)
+        statuses, entries = compiled.tick(one, tick * PERIOD_US)
         assert entries == shot.entries, f"{where}, tick {tick}"
-        codes = tuple(IDLE if code >= WAS else code for code in codes)
-        assert codes == tuple(moment.code for moment in shot.moments), f"{where}, tick {tick}"
+        assert statuses == tuple(moment.code for moment in shot.moments), f"{where}, tick {tick}"
 
 
 def question(chance: random.Random, tree: LogicTree, number: int) -> Formula:
@@ -95,9 +94,11 @@ def test_circuits_are_compiled_trees(tmp_path: Path) -> None:
         tree = logic_tree(tmp_path, f"{SEED}/c{number}", is_open=False)
         if tree is None:
             continue
+        encoding = Encoding(tree.spec(), tree.returns, PERIOD_US, tree.board)
+        if encoding.scripts.assumed:
+            continue
         compared += 1
         compiled = Compiled(tmp_path, tmp_path / "t.xml", dbc, tree.nodes, tree.board)
-        encoding = Encoding(tree.spec(), tree.returns, PERIOD_US, tree.board)
         for run in range(RUNS):
             chance = random.Random(f"{number}/{run}")
             given = [{one: chance.random() < 0.5 for one in encoding.circuit.inputs} for _ in range(TICKS)]

@@ -28,7 +28,7 @@ from canopy.semantics.spec import ATTRIBUTES, STATUS_NAMES, TEST_SCRIPTS
 
 NAME = "logic"
 FORMULA = Place("formula")
-NO_BUS = Bus(Path(), NAME, "", (), (), {}, cast(Dbc, None))
+NO_BUS = Bus(Path(), NAME, "", receive=(), send=(), source=cast(Dbc, None))
 TEXT_LOW, TEXT_HIGH = 0, 0xFFFF
 NEW = (":=", "=")
 MODELLED = ("bool", "int", "fixed", "duration", "text")

@@ -100,7 +100,8 @@ class Expressions:
 
     def _amount(self, expression: Expression) -> Amount:
         value = self.evaluate(expression)
-        assert isinstance(value, Amount), "the compiler has refused texts here"
+        if not isinstance(value, Amount):
+            raise NotModelledError("it computes with a text")
         return value
 
     # Names
@@ -140,7 +141,8 @@ class Expressions:
     def in_steps(self, value: Amount, step: Fraction) -> Word:
         """How many steps of a size a number is, of which its own step is a multiple."""
         factor = value.step / step
-        assert factor.denominator == 1, "the compiler has refused what would be rounded"
+        if factor.denominator != 1:
+            raise NotModelledError("it would be rounded")
         return self._words.multiply(value.word, self._words.constant(int(factor)))
 
     def _both_in_steps(self, left: Amount, right: Amount) -> tuple[Word, Word, Fraction]:
@@ -151,7 +153,7 @@ class Expressions:
         if sign == "!":
             return Amount(self._words.truth(self._words.is_not_zero(value.word) ^ 1))
         if sign == "-":
-            return Amount(self._words.subtract(self._words.constant(0), value.word), value.step)
+            return self._folded(Amount(self._words.subtract(self._words.constant(0), value.word), value.step))
         return Amount(self._words.inverted(self.in_steps(value, Fraction(1))))
 
     def _binary(self, expression: Binary) -> Value:
@@ -162,10 +164,18 @@ class Expressions:
             return Amount(self._words.truth((circuit.both if sign == "&&" else circuit.either)(left, right)))
         return self.computed(sign, self.evaluate(expression.left), self.evaluate(expression.right))
 
+    def _folded(self, value: Amount) -> Amount:
+        """A number that is known has the step of one that is written down: 3.5 * 2 is 7 whole steps."""
+        known = value.word.constant
+        return value if known is None else self.constant(known * value.step)
+
     def computed(self, sign: str, left: Value, right: Value) -> Value:
         """Arithmetic and bits."""
         if isinstance(left, TextValue) or isinstance(right, TextValue) or sign == "..":
             raise NotModelledError("it joins texts")
+        return self._folded(self._computed(sign, left, right))
+
+    def _computed(self, sign: str, left: Amount, right: Amount) -> Amount:
         if sign in BITS:
             one, two = self.in_steps(left, Fraction(1)), self.in_steps(right, Fraction(1))
             return Amount(self._words.bitwise(sign, one, two))
@@ -214,15 +224,18 @@ class Expressions:
 
     def _texts(self, left: Value, right: Value) -> tuple[Word, Word]:
         if isinstance(left, Amount):
-            assert isinstance(right, TextValue) and right.text is not None
-            return left.word, self._words.constant(left.choices[right.text])
+            text = right.text if isinstance(right, TextValue) else None
+            if text is None or text not in left.choices:
+                raise NotModelledError("it compares a number with a text")
+            return left.word, self._words.constant(left.choices[text])
         return left.word, right.word
 
     def _choose(self, condition: int, yes: Value, no: Value) -> Value:
         if isinstance(yes, Amount) and isinstance(no, Amount):
             one, two, step = self._both_in_steps(yes, no)
             return Amount(self._words.choose(condition, one, two), step)
-        assert isinstance(yes, TextValue) and isinstance(no, TextValue)
+        if not isinstance(yes, TextValue) or not isinstance(no, TextValue):
+            raise NotModelledError("it chooses between a number and a text")
         return TextValue(self._words.choose(condition, yes.word, no.word))
 
     def converted(self, value: Value, kind: PortType) -> Word:
