@@ -241,6 +241,28 @@ def test_what_has_no_circuit_may_return_anything(tmp_path: Path) -> None:
     assert "nothing is known of 'a': it lies below T/try" in below.output
 
 
+def test_subtrees_have_names(tmp_path: Path) -> None:
+    subtrees = '<SubTree ID="U" name="sub" _skipIf="x == 1"/><SubTree ID="U" name="last"/>'
+    body = f'<Sequence><Count n="{{x}}"/>{subtrees}</Sequence>'
+    text = document(body).replace(
+        "</BehaviorTree>", '</BehaviorTree><BehaviorTree ID="U"><Inverter><Act name="a"/></Inverter></BehaviorTree>'
+    )
+    text = text.replace('BTCPP_format="4"', 'BTCPP_format="4" main_tree_to_execute="T"')
+    path = tmp_path / "t.xml"
+    path.write_text(text)
+    for option, formula, verdict in (
+        ("--never", "SKIPPED(sub)", "refuted"),
+        ("--never", "SKIPPED(last)", "proven"),
+        ("--never", 'SKIPPED(sub) and TICKED("T/sub/a")', "proven"),
+        ("--never", "SKIPPED(sub) and TICKED(sub)", "proven"),
+        ("--always", 'SUCCESS(last) implies FAILURE("T/last/a")', "proven"),
+        ("--never", "RUNNING(T/sub) and RUNNING(last)", "proven"),
+    ):
+        assert CliRunner().invoke(command, [str(path), option, formula]).output.startswith(verdict), formula
+    wrong = CliRunner().invoke(command, [str(path), "--never", "IDLE(lost)"])
+    assert "did you mean 'last'?" in wrong.output
+
+
 POSE = "geometry_msgs::msg::PoseStamped_<std::allocator<void>>=pose_t"
 PATH = "nav_msgs::msg::Path_<std::allocator<void>>=path_t"
 

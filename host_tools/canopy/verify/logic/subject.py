@@ -134,6 +134,23 @@ class LogicTree:
                 self._by_name.setdefault(name, []).append(number)
             self.returns[number] = self._may_return(number, node)
         self._by_name.setdefault(ROOT, [0])
+        self._subtrees = self._find_subtrees()
+
+    def _find_subtrees(self) -> dict[str, list[int]]:
+        """The roots of subtrees, by name and by path: with the attributes of the SubTree, where it has some."""
+        found: dict[str, list[int]] = {}
+        for number, node in enumerate(self.nodes):
+            folder = node.path.lstrip("/").rpartition("/")[0]
+            while folder and folder not in found:
+                parent, _, name = folder.rpartition("/")
+                above = self.nodes[number - 1] if number > 0 else node
+                has_attributes = kind_of(above) == "Attributes" and above.path.lstrip("/").rpartition("/")[0] == parent
+                root = number - 1 if has_attributes and node in above.children else number
+                found[folder] = [root]
+                if name != folder:
+                    found.setdefault(name, []).append(root)
+                folder = parent
+        return found
 
     def _keep(self, root: Node) -> list[Node]:
         """Sorts the nodes: those with a circuit or in the place of one, in the order of the file; gives all others."""
@@ -188,19 +205,24 @@ class LogicTree:
             ExpressionError: There is none, or more than one.
         """
         found = self._named(name, at)
+        if not self._by_name.get(name):  # a subtree
+            while what in OF_THE_NODE_ITSELF and kind_of(self.nodes[found]) == "Attributes":
+                found += 1
+            return found
         above = self.nodes[found - 1] if found > 0 else None
         has_attributes = above is not None and kind_of(above) == "Attributes" and above.place == self.nodes[found].place
         return found - 1 if has_attributes and what not in OF_THE_NODE_ITSELF else found
 
     def _named(self, name: str, at: int) -> int:
-        found = self._by_name.get(name, [])
+        found = self._by_name.get(name) or self._subtrees.get(name.lstrip("/"), [])
         named = [number for number in found if kind_of(self.nodes[number]) != "Attributes"] or found
         exact = [number for number in named if self.nodes[number].path.lstrip("/") == name.lstrip("/")] or named
         below = self.below.get(name.lstrip("/"))
         if not exact and below is not None:
             raise ExpressionError(at, f"nothing is known of '{name}': it lies below {below}")
         if not exact:
-            raise ExpressionError(at, f"the tree has no node '{name}'", nearest(name, self._by_name))
+            known = {**self._by_name, **self._subtrees}
+            raise ExpressionError(at, f"the tree has no node '{name}'", nearest(name, known))
         if len(exact) > 1:
             paths = ", ".join(f'"{self.nodes[number].path}"' for number in exact[:8])
             raise ExpressionError(at, f"the tree has {len(exact)} nodes '{name}'", f"give the path of one: {paths}")
