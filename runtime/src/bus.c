@@ -171,6 +171,17 @@ void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, cano
     }
 }
 
+void canopy_bus_commit_owed(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until)
+{
+    for (uint16_t index = 0; index < self->bus->tx_count; index++) {
+        if (canopy_tx_owes(tx, index)) {
+            canopy_tx_post(tx, index, self->output, until);
+        } else {
+            canopy_tx_hold(tx);
+        }
+    }
+}
+
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters)
 {
     return canopy_sum(canopy_sum(counters->wrong_form, counters->wrong_crc),

@@ -121,27 +121,50 @@ static bool has_lost(canopy_loop_t *self)
     return true;
 }
 
+/** Reports what a counter has grown by since the last cycle. */
+static void account_for(const canopy_loop_t *self, canopy_fault_t fault, uint32_t counter, uint32_t *before)
+{
+    if (counter != *before) {
+        report(self, fault, counter - *before);
+        *before = counter;
+    }
+}
+
 static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
 {
     canopy_tx_counters_t counters;
-    uint32_t late;
 
     if (self->can_manager.state != before) {
         report(self, CANOPY_FAULT_CAN_STATE, (uint32_t)self->can_manager.state);
     }
     canopy_tx_count(self->config->app->tx, &counters);
-    late = canopy_sum(counters.expired, counters.replaced); /* a value that is replaced was not out in its cycle */
-    if (late != self->tx_expired) {
-        report(self, CANOPY_FAULT_TX_EXPIRED, late - self->tx_expired);
-        self->tx_expired = late;
-    }
+    account_for(self, CANOPY_FAULT_TX_EXPIRED, counters.expired, &self->tx_expired);
+    account_for(self, CANOPY_FAULT_TX_REPLACED, counters.replaced, &self->tx_replaced);
 }
 
-/** What was decided for a bus that was not there must not be the first thing on it: safe values, until they are out. */
+static bool owes_any(const canopy_app_t *app)
+{
+    for (uint16_t message = 0; message < app->bus->tx_count; message++) {
+        if (canopy_tx_owes(app->tx, message)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/**
+ * What was decided for a bus that was not there must not be the first thing on it: safe values, until one of each message
+ * is out. Not all in one cycle: a slow bus would never be done.
+ */
 static bool is_returning(const canopy_loop_t *self)
 {
-    return canopy_can_is_unusable(self->can_manager.state) ||
-           (self->returning && !canopy_tx_is_out(self->config->app->tx));
+    const canopy_app_t *app = self->config->app;
+
+    if (canopy_can_is_unusable(self->can_manager.state)) {
+        canopy_tx_owe(app->tx);
+        return true;
+    }
+    return self->returning && owes_any(app);
 }
 
 /** In a replay the bus is what it was. */
@@ -156,6 +179,9 @@ static void take_recorded_conditions(canopy_loop_t *self, canopy_cycle_t *cycle)
         cycle->can_state = (canopy_can_state_t)conditions.can_state;
         self->can_manager.state = cycle->can_state;
         self->returning = conditions.returning;
+        if (self->returning) {
+            canopy_tx_owe(self->config->app->tx); /* which ones still did, nobody has recorded */
+        }
     }
 }
 
@@ -182,14 +208,14 @@ static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
     return cycle;
 }
 
-/** Posts what the tree wants, or the safe values of all messages while the bus is returning. */
+/** Posts what the tree wants, or while the bus is returning the safe values that are not out yet. */
 static void write_outputs(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
 
     if (self->returning) {
         app->bus->reset_output(app->output);
-        canopy_bus_commit_all(app->bus_state, app->tx, now + app->period);
+        canopy_bus_commit_owed(app->bus_state, app->tx, now + app->period);
     } else {
         canopy_bus_commit(app->bus_state, app->tx, self->ticks, now);
     }

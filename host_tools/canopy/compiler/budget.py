@@ -102,7 +102,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
     bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8])
     trace_state = struct_size([pointer, u16, u8, u8])
     rx_state = struct_size([u64, *[u8] * 6, u16])
-    tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
+    tx_slot = struct_size([array(u64, 2), *[u32] * 5, *[u8] * 4])
     tx_trace = struct_size([u64, u32, *[u8] * 9])
     tx_mailbox = struct_size([u64, u32, u16, u8])
     tx = struct_size(
@@ -111,7 +111,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
             u32,
             u16,
             u8,
-            *[u32] * 3,
+            *[u32] * 4,
             *[u8] * 4,
             u64,
             array(tx_mailbox, MAILBOXES_MAX),

@@ -120,6 +120,12 @@ void canopy_bus_commit(const canopy_bus_state_t *self, canopy_tx_t *tx, uint32_t
 /** Posts every message, due or not, with one deadline. O(messages). */
 void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until);
 
+/**
+ * On the way back after an unusable bus (canopy_tx_owe()): posts the messages that still owe a value, and holds back the
+ * others, so that on a slow bus each gets its turn. O(messages).
+ */
+void canopy_bus_commit_owed(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until);
+
 /** Frames refused for any reason but an unknown id; saturates. O(1). */
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters);
 

@@ -59,6 +59,8 @@ typedef struct {
         latest;           /* loop: version << 2 | buffer << 1 | 1 of what was posted last; 0: none, or being written */
     _Atomic uint32_t out; /* service: last version that is out; UINT32_MAX, which is no version: none ever was */
     uint32_t posted;      /* loop: last version */
+    uint32_t owed_after;  /* loop: while it owes, a version after this one must get out */
+    bool owes;            /* loop */
     uint32_t taken;       /* service: last version that went to a mailbox, or was dropped */
     _Atomic uint8_t reading; /* service: 1 + the buffer that it copies; 0: none */
     uint8_t counter;         /* service: E2E counter of the next frame */
@@ -111,6 +113,7 @@ typedef struct {
     uint8_t mailbox_count;
     /* The loop's: */
     uint32_t trace_full;         /* frames that found no place */
+    uint32_t held;               /* commands held back */
     _Atomic uint32_t trace_head; /* frames that ever got a place */
     /* The service's: */
     _Atomic uint32_t trace_tail; /* frames that ever left theirs */
@@ -151,6 +154,18 @@ canopy_error_t canopy_tx_init(canopy_tx_t *self, const canopy_tx_message_t *mess
  * @param until   when it must be out [us]. O(bytes).
  */
 void canopy_tx_post(canopy_tx_t *self, uint16_t message, const void *output, canopy_time_t until);
+
+/**
+ * From now on every message owes a value: one that is posted after this call, and gets out. For the way back of a bus on
+ * which nothing got out. Loop's thread. O(messages).
+ */
+void canopy_tx_owe(canopy_tx_t *self);
+
+/** True until a value that a message owes is known to be out. Loop's thread. O(1). */
+bool canopy_tx_owes(canopy_tx_t *self, uint16_t message);
+
+/** A command is held back for others that are owed: it counts as replaced, and uses up no E2E counter. Loop's thread. O(1). */
+void canopy_tx_hold(canopy_tx_t *self);
 
 /** Lets a trace frame wait behind the commands. Loop's thread. One that finds no room is lost and counted. O(1). */
 void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy_tx_trace_data_t *data,
