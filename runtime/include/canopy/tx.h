@@ -60,11 +60,11 @@ typedef struct {
     _Atomic uint32_t out; /* service: last version that is out; UINT32_MAX, which is no version: none ever was */
     uint32_t posted;      /* loop: last version */
     uint32_t owed_after;  /* loop: while it owes, a version after this one must get out */
-    bool owes;            /* loop */
     uint32_t taken;       /* service: last version that went to a mailbox, or was dropped */
     _Atomic uint8_t reading; /* service: 1 + the buffer that it copies; 0: none */
     uint8_t counter;         /* service: E2E counter of the next frame */
     bool flying;             /* service: in a mailbox */
+    bool owes;               /* loop */
 } canopy_tx_slot_t;
 
 #define CANOPY_TX_TRACE_LENGTH 8u
