@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "tx_parts.h"
+
 enum { LATENESS_FIRST_US = 16 };
 
 static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t detail)
@@ -132,14 +134,13 @@ static void account_for(const canopy_loop_t *self, canopy_fault_t fault, uint32_
 
 static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
 {
-    canopy_tx_counters_t counters;
+    const canopy_tx_t *tx = self->config->app->tx;
 
     if (self->can_manager.state != before) {
         report(self, CANOPY_FAULT_CAN_STATE, (uint32_t)self->can_manager.state);
     }
-    canopy_tx_count(self->config->app->tx, &counters);
-    account_for(self, CANOPY_FAULT_TX_EXPIRED, counters.expired, &self->tx_expired);
-    account_for(self, CANOPY_FAULT_TX_REPLACED, counters.replaced, &self->tx_replaced);
+    account_for(self, CANOPY_FAULT_TX_EXPIRED, canopy_tx_expired(tx), &self->tx_expired);
+    account_for(self, CANOPY_FAULT_TX_REPLACED, canopy_tx_replaced(tx), &self->tx_replaced);
 }
 
 static bool owes_any(const canopy_app_t *app)
@@ -186,11 +187,11 @@ static void take_recorded_conditions(canopy_loop_t *self, canopy_cycle_t *cycle)
 }
 
 /** What this tick works with: frames, time, and the state of the bus. */
-static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
+static void read_inputs(canopy_loop_t *self, canopy_cycle_t *cycle)
 {
     const canopy_app_t *app = self->config->app;
+    const canopy_time_t now = cycle->now;
     canopy_can_state_t before = self->can_manager.state;
-    canopy_cycle_t cycle = {.now = now};
     bool lasts;
     bool lost;
 
@@ -199,13 +200,12 @@ static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
     }
     lasts = backlog_lasts(self, drain(self, now));
     lost = has_lost(self);
-    cycle.overload = lasts || lost;
-    cycle.can_state =
+    cycle->overload = lasts || lost;
+    cycle->can_state =
         canopy_can_manager_step(&self->can_manager, self->config->can, canopy_tx_is_blocked(app->tx), now);
     self->returning = is_returning(self);
-    take_recorded_conditions(self, &cycle);
+    take_recorded_conditions(self, cycle);
     account_for_bus(self, before);
-    return cycle;
 }
 
 /** Posts what the tree wants, or while the bus is returning the safe values that are not out yet. */
@@ -240,9 +240,10 @@ canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
     uint32_t faults = app->tree_instance->faults;
-    canopy_cycle_t cycle = read_inputs(self, now);
+    canopy_cycle_t cycle = {.now = now};
     canopy_status_t root;
 
+    read_inputs(self, &cycle);
     canopy_bus_begin_tick(app->bus_state, &cycle);
     root = canopy_tree_tick(app->tree_instance, now);
     write_outputs(self, now);

@@ -24,6 +24,7 @@ static void start_trace_and_counters(canopy_tx_t *self)
 {
     self->trace_full = 0;
     self->held = 0;
+    self->in_flight = 0;
     self->trace_flying = false;
     self->watching = false;
     atomic_init(&self->trace_head, 0u);
@@ -137,16 +138,6 @@ void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)
     }
 }
 
-bool canopy_tx_is_busy(const canopy_tx_t *self)
-{
-    return atomic_load_explicit(&self->busy, memory_order_relaxed);
-}
-
-bool canopy_tx_is_blocked(const canopy_tx_t *self)
-{
-    return atomic_load_explicit(&self->blocked, memory_order_relaxed);
-}
-
 bool canopy_tx_is_out(const canopy_tx_t *self)
 {
     for (uint16_t index = 0; index < self->count; index++) {
@@ -163,8 +154,8 @@ bool canopy_tx_is_out(const canopy_tx_t *self)
 void canopy_tx_count(const canopy_tx_t *self, canopy_tx_counters_t *counters)
 {
     counters->sent = atomic_load_explicit(&self->sent, memory_order_relaxed);
-    counters->replaced = canopy_sum(self->held, atomic_load_explicit(&self->replaced, memory_order_relaxed));
-    counters->expired = atomic_load_explicit(&self->expired, memory_order_relaxed);
+    counters->replaced = canopy_tx_replaced(self);
+    counters->expired = canopy_tx_expired(self);
     counters->trace_sent = atomic_load_explicit(&self->trace_sent, memory_order_relaxed);
     counters->trace_dropped =
         canopy_sum(self->trace_full, atomic_load_explicit(&self->trace_late, memory_order_relaxed));

@@ -99,7 +99,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8])
+    bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8, u16])
     trace_state = struct_size([pointer, u16, u8, u8])
     rx_state = struct_size([u64, *[u8] * 6, u16])
     tx_slot = struct_size([array(u64, 2), *[u32] * 5, *[u8] * 4])
@@ -112,7 +112,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
             u16,
             u8,
             *[u32] * 4,
-            *[u8] * 4,
+            *[u8] * 5,
             u64,
             array(tx_mailbox, MAILBOXES_MAX),
             *[u32] * 5,

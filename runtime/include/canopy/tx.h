@@ -117,6 +117,7 @@ typedef struct {
     _Atomic uint32_t trace_head; /* frames that ever got a place */
     /* The service's: */
     _Atomic uint32_t trace_tail; /* frames that ever left theirs */
+    uint8_t in_flight;           /* frames in mailboxes */
     bool trace_flying;           /* the oldest frame is in a mailbox */
     bool watching;               /* something was handed over, and nothing has got out since */
     _Atomic bool busy;           /* a frame is in a mailbox, or waits because none took it */
@@ -185,7 +186,10 @@ void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
 void canopy_tx_service(canopy_tx_t *self, canopy_time_t now);
 
 /** True while a frame is in a mailbox, or waits for one, as the service saw it last. Anyone. O(1). */
-bool canopy_tx_is_busy(const canopy_tx_t *self);
+static inline bool canopy_tx_is_busy(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->busy, memory_order_relaxed);
+}
 
 /** True when the last value of every message that was ever posted is known to be out. Loop's thread. O(messages). */
 bool canopy_tx_is_out(const canopy_tx_t *self);
@@ -194,7 +198,10 @@ bool canopy_tx_is_out(const canopy_tx_t *self);
  * True while the bus lets nothing through: a frame is not out at its deadline, and nothing has got out since it was handed
  * to the driver. One that only lost to more urgent ones does not count. Anyone. O(1).
  */
-bool canopy_tx_is_blocked(const canopy_tx_t *self);
+static inline bool canopy_tx_is_blocked(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->blocked, memory_order_relaxed);
+}
 
 /** Copies the counters, which saturate. Loop's thread. O(1). */
 void canopy_tx_count(const canopy_tx_t *self, canopy_tx_counters_t *counters);
