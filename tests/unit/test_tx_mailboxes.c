@@ -388,6 +388,31 @@ static void of_several_frames_the_first_deadline_counts(void)
     TEST_ASSERT_TRUE(canopy_tx_is_blocked(&tx));
 }
 
+/* The transmit interrupt goes on when the loop hangs: it knows each frame's deadline by itself. */
+static void when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(bool can_abort, unsigned leave)
+{
+    can.abort = can_abort ? boxes_abort : NULL;
+    start(3);
+    for (uint16_t message = 0; message < (uint16_t)MESSAGES; message++) {
+        post(message, 1, 100);
+    }
+    canopy_tx_service(&tx, 0);
+    let_all_out(5000); /* the bus was blocked up to now: the first frame is out, and its interrupt comes */
+    TEST_ASSERT_EQUAL_UINT(leave, boxes.out_count);
+    TEST_ASSERT_EQUAL_UINT32(leave, counted().sent);
+    TEST_ASSERT_EQUAL_UINT32(MESSAGES - leave, counted().expired);
+}
+
+static void when_the_loop_hangs_the_interrupt_takes_back_what_is_late(void)
+{
+    when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(true, 1);
+}
+
+static void when_the_loop_hangs_and_nothing_can_be_taken_back_the_mailboxes_leave(void)
+{
+    when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(false, 3);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -408,5 +433,7 @@ int main(void)
     RUN_TEST(a_driver_that_takes_nothing_is_a_blocked_bus_too);
     RUN_TEST(a_frame_that_only_loses_to_more_urgent_ones_does_not_make_it_a_blocked_bus);
     RUN_TEST(of_several_frames_the_first_deadline_counts);
+    RUN_TEST(when_the_loop_hangs_the_interrupt_takes_back_what_is_late);
+    RUN_TEST(when_the_loop_hangs_and_nothing_can_be_taken_back_the_mailboxes_leave);
     return UNITY_END();
 }
