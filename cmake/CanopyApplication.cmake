@@ -4,6 +4,7 @@
 #                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
 #                        [BITRATE bit/s] [FOREIGN_LOAD percent] [FOREIGN_BURST frames] [TX_LATENCY_US us]
+#                        [TRACE_TICKS ticks]
 #                        [MAX_RAM bytes] [MAX_FLASH bytes])
 #
 # Compiles a tree and a bus description to C at build time, and makes the static library NAME_application of the
@@ -37,7 +38,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
-                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
+                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;TRACE_TICKS;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -55,8 +56,8 @@ function(canopy_add_application NAME)
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
-  foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US MAX_RAM MAX_FLASH IMAGE_NODES
-                 IMAGE_USES)
+  foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US TRACE_TICKS MAX_RAM MAX_FLASH
+                 IMAGE_NODES IMAGE_USES)
     if(DEFINED APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")

@@ -28,6 +28,7 @@ TRACE_MESSAGES = (
 )
 PERIOD_US_MAX = 3_600_000_000
 ID_MAX = 2**29 - 1
+TRACE_TICKS_MAX = 1_000
 LINE_MAX = 2**31 - 1
 
 T = TypeVar("T")
@@ -68,6 +69,8 @@ class Model:
     """Of the DBC that the firmware was built with; None: not known."""
     trace: dict[str, int]
     """Arbitration id of each trace message the DBC has; always CanopyTick."""
+    trace_ticks: int
+    """Ticks whose trace can wait while the bus lets nothing through. Not in the file: 1."""
 
     def depth(self, index: int) -> int:
         """Number of ancestors of a node; 0 for the root."""
@@ -126,6 +129,7 @@ class _Reader:
             receive=self._list(bus, "bus.", "receive", self._name),
             send=self._list(bus, "bus.", "send", self._name),
             trace=self._trace(self._get(data, "", "trace", dict)),
+            trace_ticks=self._number(data, "", "trace_ticks", 1, TRACE_TICKS_MAX) if "trace_ticks" in data else 1,
         )
 
     def _hash(self, data: dict[str, Any]) -> str:

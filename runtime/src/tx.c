@@ -27,6 +27,7 @@ static void start_trace_and_counters(canopy_tx_t *self)
     self->in_flight = 0;
     self->trace_flying = false;
     self->watching = false;
+    atomic_init(&self->trace_stopped, false);
     atomic_init(&self->trace_head, 0u);
     atomic_init(&self->trace_tail, 0u);
     atomic_init(&self->busy, false);
@@ -127,6 +128,11 @@ void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy
     frame->flags = flags;
     frame->data = *data;
     atomic_store_explicit(&self->trace_head, head + 1u, memory_order_release);
+}
+
+void canopy_tx_stop_trace(canopy_tx_t *self)
+{
+    atomic_store_explicit(&self->trace_stopped, true, memory_order_relaxed);
 }
 
 void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)

@@ -127,6 +127,21 @@ static bool take_back(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
     return settle(self, mailbox, now) != CANOPY_CAN_PENDING;
 }
 
+static bool trace_is_stopped(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->trace_stopped, memory_order_relaxed);
+}
+
+/** Must the frame in a mailbox not get out any more? */
+static bool is_void(const canopy_tx_t *self, const canopy_tx_mailbox_t *box, canopy_time_t now)
+{
+    if (canopy_time_reached(now, box->until)) {
+        return true;
+    }
+    return box->what == CANOPY_TX_TRACE ? trace_is_stopped(self)
+                                        : is_replaced(&self->slots[box->what - 1u], box->version);
+}
+
 /** Empties mailboxes: what is out, and what must not get out any more. */
 static void collect(canopy_tx_t *self, canopy_time_t now)
 {
@@ -136,8 +151,7 @@ static void collect(canopy_tx_t *self, canopy_time_t now)
         if (box->what == 0u || settle(self, mailbox, now) != CANOPY_CAN_PENDING) {
             continue;
         }
-        if (canopy_time_reached(now, box->until) ||
-            (box->what != CANOPY_TX_TRACE && is_replaced(&self->slots[box->what - 1u], box->version))) {
+        if (is_void(self, box, now)) {
             (void)take_back(self, mailbox, now);
         }
     }
@@ -341,6 +355,17 @@ static int send_traces(canopy_tx_t *self, canopy_time_t now)
     return 1;
 }
 
+/** Drops what waits, unless its oldest frame is in a mailbox: then it has to stay where it is. */
+static void drop_traces(canopy_tx_t *self)
+{
+    const uint32_t head = atomic_load_explicit(&self->trace_head, memory_order_acquire);
+
+    if (!self->trace_flying) {
+        add(&self->trace_late, head - atomic_load_explicit(&self->trace_tail, memory_order_relaxed));
+        atomic_store_explicit(&self->trace_tail, head, memory_order_release);
+    }
+}
+
 void canopy_tx_service(canopy_tx_t *self, canopy_time_t now)
 {
     int result;
@@ -352,7 +377,9 @@ void canopy_tx_service(canopy_tx_t *self, canopy_time_t now)
         atomic_store_explicit(&self->blocked, true, memory_order_relaxed);
     }
     result = send_commands(self, now);
-    if (result == 1) {
+    if (trace_is_stopped(self)) {
+        drop_traces(self);
+    } else if (result == 1) {
         result = send_traces(self, now);
     }
     atomic_store_explicit(&self->busy, result == 0 || self->in_flight != 0u, memory_order_relaxed);

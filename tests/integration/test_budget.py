@@ -52,6 +52,26 @@ def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: 
     assert int(memory[1]) - USER_STATE.get(name, 0) == pytest.approx(int(budget[1]), abs=7)
 
 
+def test_room_for_the_trace_is_stated_in_ticks(tmp_path: Path) -> None:
+    tree, dbc, period = APPLICATIONS["nao_home"]
+    arguments = ["compile", str(ROOT / tree), "--name", "nao_home", "--dbc", str(ROOT / dbc), "--node", "Controller"]
+    arguments += ["--period-ms", str(period), "-o", str(tmp_path)]
+    printed = CliRunner().invoke(main, arguments).output
+    assert re.search(r"^  trace +768 bytes of the RAM, room for 4 ticks without a bus$", printed, re.MULTILINE)
+    sizes = {}
+    for ticks in (1, 2, 4, 20, 21):
+        budget = json.loads(CliRunner().invoke(main, [*arguments, "--json", "--trace-ticks", str(ticks)]).output)
+        assert budget["trace_ticks"] == ticks
+        assert f".trace_ticks = {ticks}u," in (tmp_path / "nao_home_app.c").read_text(encoding="utf-8")
+        sizes[ticks] = budget["trace_bytes"]
+        assert budget["ram_bytes"] - budget["trace_bytes"] == 424
+    # Six frames a tick at most, and two slow ones a second, each of 24 bytes; a power of two of them.
+    assert sizes == {1: 8 * 24, 2: 16 * 24, 4: 32 * 24, 20: 128 * 24, 21: 256 * 24}
+    refused = CliRunner().invoke(main, [*arguments, "--trace-ticks", "0"])
+    assert refused.exit_code == 2
+    assert "--trace-ticks" in refused.output
+
+
 def test_each_kind_of_node_has_a_price(tmp_path: Path) -> None:
     tree, dbc, period = APPLICATIONS["features"]
     arguments = ["compile", str(ROOT / tree), "--name", "features", "--dbc", str(ROOT / dbc), "--node", "Controller"]

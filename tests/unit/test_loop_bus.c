@@ -452,6 +452,29 @@ static void arrivals_tell_that_safe_values_went_out_instead_of_the_trees(void)
     expect_sent(ARRIVALS_ID, back);
 }
 
+/** The trace of so many ticks is still there when the bus lets frames through again after `ticks` of them. */
+static uint32_t trace_lost_after(unsigned ticks)
+{
+    canopy_tx_counters_t counters;
+
+    trace.tick.id = HEALTH_ID;
+    for (unsigned tick = 0; tick < ticks; tick++) {
+        cycle(0);
+    }
+    canopy_tx_count(&memory.tx, &counters);
+    return counters.trace_dropped;
+}
+
+static void the_trace_waits_for_the_bus_as_long_as_it_has_room(void)
+{
+    use_mailboxes();
+    TEST_ASSERT_EQUAL_UINT32(1, trace_lost_after(CANOPY_TRACE_PERIODS + 1u));
+    use_mailboxes();
+    app.trace_ticks = 6;
+    TEST_ASSERT_EQUAL_UINT32(0, trace_lost_after(CANOPY_TRACE_PERIODS + 6u));
+    TEST_ASSERT_EQUAL_UINT32(1, trace_lost_after(1));
+}
+
 static void health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter(void)
 {
     static const uint8_t open[] = {0, 0, 1, 0, 9, 0, 0, 0};
@@ -493,6 +516,7 @@ int main(void)
     RUN_TEST(arrivals_of_exactly_one_frame_are_one_frame);
     RUN_TEST(arrivals_tell_the_state_of_the_bus_when_it_has_changed);
     RUN_TEST(arrivals_tell_that_safe_values_went_out_instead_of_the_trees);
+    RUN_TEST(the_trace_waits_for_the_bus_as_long_as_it_has_room);
     RUN_TEST(health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter);
     return UNITY_END();
 }

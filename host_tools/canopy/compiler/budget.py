@@ -25,6 +25,8 @@ NODE_FLASH = 12  # sizeof(canopy_node_t)
 NODE_RAM = 2  # its status, and the one that the trace sent last
 WORD_RAM = 2
 MAILBOXES_MAX = 4  # CANOPY_CAN_MAILBOXES_MAX
+TRACE_TICKS_DEFAULT = 4
+"""Enough for a bus-off at a period of 50 ms or more: the first restart comes after 50 ms."""
 SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
 
 
@@ -70,6 +72,9 @@ class Budget:
     bitrate: int
     kinds: tuple[KindCost, ...]
     bounds: Bounds
+    trace_ticks: int
+    trace_bytes: int
+    """Of the RAM: where the trace of so many ticks waits for the bus."""
 
     def as_dict(self) -> dict[str, object]:
         """For the model file."""
@@ -93,8 +98,20 @@ class ImageCost:
     tables: int = 0
 
 
-def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> int:
-    """Size of the application's static object: the struct that the template application.c.j2 declares."""
+def _trace_ring(capacity: int) -> tuple[int, int]:
+    u8, u32, u64 = (scalar(t) for t in ("uint8_t", "uint32_t", "uint64_t"))
+    return array(struct_size([u64, u32, *[u8] * 9]), capacity)
+
+
+def ram_bytes(table: Table, bus: Bus, images: ImageCost, capacity: int) -> int:
+    """Size of the application's static object: the struct that the template application.c.j2 declares.
+
+    Args:
+        table: Of the tree.
+        bus: Of the DBC.
+        images: What tree images add.
+        capacity: Trace frames that can wait.
+    """
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
@@ -103,7 +120,6 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
     trace_state = struct_size([pointer, u16, u8, u8])
     rx_state = struct_size([u64, *[u8] * 6, u16])
     tx_slot = struct_size([array(u64, 2), *[u32] * 5, *[u8] * 4])
-    tx_trace = struct_size([u64, u32, *[u8] * 9])
     tx_mailbox = struct_size([u64, u32, u16, u8])
     tx = struct_size(
         [
@@ -112,7 +128,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
             u16,
             u8,
             *[u32] * 4,
-            *[u8] * 5,
+            *[u8] * 6,
             u64,
             array(tx_mailbox, MAILBOXES_MAX),
             *[u32] * 5,
@@ -129,7 +145,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
             trace_state,
             tx,
             array(tx_slot, max(1, len(bus.send))),
-            array(tx_trace, trace_capacity(bus, changes_max)),
+            _trace_ring(capacity),
             image_in,
             image_out,
             entries_size(table),
@@ -205,11 +221,13 @@ def make_budget(
     bitrate: int,
     others: Others,
     images: ImageCost | None = None,
+    trace_ticks: int = TRACE_TICKS_DEFAULT,
 ) -> Budget:
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     images = images or ImageCost()
+    capacity = trace_capacity(bus, changes_max, period_ms, trace_ticks)
     return Budget(
-        ram_bytes=ram_bytes(table, bus, images, changes_max),
+        ram_bytes=ram_bytes(table, bus, images, capacity),
         flash_bytes=flash_bytes(table, bus) + images.tables,
         nodes=len(table.rows),
         worst_tick_leaf_calls=sum(len(use.nodes) for use in table.leaves),
@@ -218,4 +236,6 @@ def make_budget(
         bitrate=bitrate,
         kinds=kind_costs(table),
         bounds=make_bounds(bus, bitrate, others, trace_frames(bus, changes_max)),
+        trace_ticks=trace_ticks,
+        trace_bytes=_trace_ring(capacity)[0] if bus.trace else 0,
     )

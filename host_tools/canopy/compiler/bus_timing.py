@@ -6,6 +6,7 @@ from __future__ import annotations
 from canopy.compiler.bus_model import Bus
 
 ARRIVALS_IN_FRAME = 3  # messages that one CanopyArrivals frame tells of
+SLOW_TRACE = ("CanopyHealth", "CanopyModel")
 SHORTEST_FRAME_BITS = 47  # classic, 11-bit id, no data, no stuff bit, interframe space included
 
 
@@ -59,6 +60,15 @@ def trace_frames(bus: Bus, changes_max: int) -> int:
     return sum(frames.get(kind, 1) for kind in bus.trace)
 
 
-def trace_capacity(bus: Bus, changes_max: int) -> int:
-    """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-    return 1 << max(0, trace_frames(bus, changes_max) - 1).bit_length()
+def every_ticks(bus: Bus, name: str, period_ms: int) -> int:
+    """The slow trace message of this name is sent in every so-many-th tick."""
+    message = bus.trace.get(name)
+    return max(1, message.cycle_ms // period_ms) if message is not None else 1
+
+
+def trace_capacity(bus: Bus, changes_max: int, period_ms: int, ticks: int) -> int:
+    """Trace frames that can wait: all those of so many ticks in a row, rounded up to a power of two."""
+    slow = [name for name in SLOW_TRACE if name in bus.trace]
+    frames = ticks * (trace_frames(bus, changes_max) - len(slow))
+    frames += sum(-(-ticks // every_ticks(bus, name, period_ms)) for name in slow)
+    return 1 << max(0, frames - 1).bit_length()

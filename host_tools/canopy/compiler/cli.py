@@ -11,11 +11,11 @@ from typing import TypeVar
 import click
 
 from canopy.compiler.bounds import BURST, LATENCY_US, LOAD_PERCENT, Bounds, Others, refusal
-from canopy.compiler.budget import Budget
+from canopy.compiler.budget import TRACE_TICKS_DEFAULT, Budget
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
-from canopy.compiler.limits import BITRATE, PERIOD_MS, Limits
+from canopy.compiler.limits import BITRATE, PERIOD_MS, TRACE_TICKS, Limits
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options, is_fixed_point
@@ -41,6 +41,8 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     echo(f"{name}: {budget.nodes} nodes, depth {budget.max_depth}")
     echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
     echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
+    if budget.trace_bytes:
+        echo(f"  trace  {budget.trace_bytes:6d} bytes of the RAM, room for {budget.trace_ticks} ticks without a bus")
     echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
     echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
     _print_bounds(budget.bounds)
@@ -190,6 +192,13 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
     type=click.IntRange(0, 1_000_000),
     help="From a free mailbox to its next frame.",
 )
+@click.option(
+    "--trace-ticks",
+    default=TRACE_TICKS_DEFAULT,
+    show_default=True,
+    type=in_range(TRACE_TICKS),
+    help="Keep the trace of so many ticks while the bus lets nothing through.",
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -215,6 +224,7 @@ def command(
     foreign_load: int,
     foreign_burst: int,
     tx_latency_us: int,
+    trace_ticks: int,
     max_ram: int | None,
     max_flash: int | None,
     costs: bool,
@@ -235,7 +245,7 @@ def command(
         images = _images(image_nodes, image_uses)
         others = Others(foreign_load, foreign_burst, tx_latency_us)
         application = load_application(
-            name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others
+            name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others, trace_ticks
         )
         broken = refusal(application.bus, application.budget.bounds)
         if broken is not None:

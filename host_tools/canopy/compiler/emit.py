@@ -17,9 +17,9 @@ from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.bounds import Others
-from canopy.compiler.budget import Budget, make_budget
+from canopy.compiler.budget import TRACE_TICKS_DEFAULT, Budget, make_budget
 from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
-from canopy.compiler.bus_timing import frame_us, frames_in, trace_capacity
+from canopy.compiler.bus_timing import every_ticks, frame_us, frames_in, trace_capacity
 from canopy.compiler.dbc_file import read_dbc
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.generation import PLACEHOLDER, tie
@@ -88,13 +88,12 @@ class Application:
 
     @property
     def trace_capacity(self) -> int:
-        """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-        return trace_capacity(self.bus, self.changes_max)
+        """Trace frames that can wait: those of `budget.trace_ticks` ticks, rounded up to a power of two."""
+        return trace_capacity(self.bus, self.changes_max, self.period_ms, self.budget.trace_ticks)
 
     def every(self, name: str) -> int:
         """The slow trace message of this name is sent in every so-many-th tick."""
-        message = self.bus.trace.get(name)
-        return max(1, message.cycle_ms // self.period_ms) if message is not None else 1
+        return every_ticks(self.bus, name, self.period_ms)
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:
@@ -132,6 +131,7 @@ def load_application(
     options: Options | None = None,
     images: tuple[int, int] | None = None,
     others: Others | None = None,
+    trace_ticks: int = TRACE_TICKS_DEFAULT,
 ) -> Application:
     """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
 
@@ -158,7 +158,7 @@ def load_application(
         table = exchangeable(table)
         catalogue = Catalogue(table, make_room(table, *images))
     cost = image_cost(table, catalogue.room) if catalogue is not None else None
-    budget = make_budget(table, bus, period_ms, changes_max, bitrate, others or Others(), cost)
+    budget = make_budget(table, bus, period_ms, changes_max, bitrate, others or Others(), cost, trace_ticks)
     return Application(name, table, bus, period_ms, bitrate, budget, changes_max, options, catalogue)
 
 
@@ -208,6 +208,7 @@ def model(application: Application) -> dict[str, object]:
             "send": [message.name for message in bus.send],
         },
         "trace": {name: message.id for name, message in bus.trace.items()},
+        "trace_ticks": application.budget.trace_ticks,
         "budget": application.budget.as_dict(),
         **({"image": application.images.model(application.options)} if application.images is not None else {}),
     }

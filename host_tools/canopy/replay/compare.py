@@ -17,13 +17,10 @@ import can
 from canopy.replay import e2e
 from canopy.replay.align import Alignment, Lacking, Replayed, Rules, Same, align, not_counted
 from canopy.replay.explain import explain
-from canopy.replay.log import AHEAD, NEEDED, Bus, Run, Sent, key
+from canopy.replay.log import NEEDED, Bus, Run, Sent, key
 
 NOT_COMPARED = {"CanopyTick": bytes([0] * 7 + [0xFF]), "CanopyHealth": bytes([0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0])}
 """Bits that do not follow from the inputs: Overruns; RxUnknown and TxDropped."""
-_COUNTED_AFTER = AHEAD + 1
-"""Ticks from the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
-of a tick leaves, all commands of the tick have left or were counted."""
 _SATURATED = 0xFFFF
 _LAST = 1 << 62
 """In the order of the replay's frames: behind all."""
@@ -121,7 +118,7 @@ class Comparison:
 
     def _align(self, number: int, replayed: Sequence[Replayed]) -> Alignment:
         may_lack = 0 if self._is_needed(number) else max((count for _, count in self._counted), default=0)
-        ahead = 0 if number in self._bus.trace else AHEAD
+        ahead = 0 if number in self._bus.trace else self._bus.ahead
         rules = Rules(ahead, may_lack, self._whole, self._same(number))
         recorded = self._run.sent.get(number, [])
         found = (align(recorded[start:], replayed, rules) for start in self._starts(number, recorded))
@@ -155,7 +152,7 @@ class Comparison:
                 continue
             for what in explain(self._bus, number, sent.data, frame.data):
                 self._differ(frame.tick, frame.order, name, what, sent.place)
-        ahead = 0 if number in self._bus.trace else AHEAD
+        ahead = 0 if number in self._bus.trace else self._bus.ahead
         for sent in alignment.extra:
             if sent.tick + ahead < done:  # else it may be of a tick that is not compared
                 self._differ(sent.tick, _LAST, name, ("frame", sent.data.hex(" "), "none"), sent.place)
@@ -183,8 +180,11 @@ class Comparison:
         if self._is_needed(number):
             return []
         following = {frame.order: later.tick for frame, later in pairwise(replayed)}
+        # From the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
+        # of a tick leaves, all commands of the tick have left or were counted.
+        counted_after = self._bus.ahead + 1
         return [
-            Lacking(number, frame, following.get(frame.order, self._ticks) + _COUNTED_AFTER)
+            Lacking(number, frame, following.get(frame.order, self._ticks) + counted_after)
             for frame in alignment.lacking
             if frame.tick < self._whole
         ]

@@ -34,6 +34,7 @@ typedef struct {
     const canopy_can_acceptance_t *acceptance; /**< What it receives: for the driver's filter. */
     uint32_t rx_max;                           /**< Frames that the bus can carry in one period, > 0. */
     uint32_t frame_us;                         /**< How long the bus takes for a frame of 8 bytes [us], > 0. */
+    uint32_t trace_ticks; /**< Ticks whose trace has room in tx_memory: a frame waits so many periods longer. */
     void *memory; /**< The application's one static object; handed to the leaves' functions. The rest lies in it: */
     void (*start)(
         void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */

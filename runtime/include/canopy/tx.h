@@ -119,6 +119,7 @@ typedef struct {
     _Atomic uint32_t trace_tail; /* frames that ever left theirs */
     uint8_t in_flight;           /* frames in mailboxes */
     bool trace_flying;           /* the oldest frame is in a mailbox */
+    _Atomic bool trace_stopped;  /* by the loop: no trace frame leaves any more */
     bool watching;               /* something was handed over, and nothing has got out since */
     _Atomic bool busy;           /* a frame is in a mailbox, or waits because none took it */
     _Atomic bool blocked;
@@ -171,6 +172,18 @@ void canopy_tx_hold(canopy_tx_t *self);
 /** Lets a trace frame wait behind the commands. Loop's thread. One that finds no room is lost and counted. O(1). */
 void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy_tx_trace_data_t *data,
                      canopy_time_t until);
+
+/**
+ * From now on no trace frame leaves: those that wait are dropped and counted by the next service, and so is the one in a
+ * mailbox where the hardware can take it back. canopy_tx_resume_trace() ends that. Loop's thread. O(1).
+ */
+void canopy_tx_stop_trace(canopy_tx_t *self);
+
+/** Trace frames that are posted from now on leave again. Loop's thread. O(1). */
+static inline void canopy_tx_resume_trace(canopy_tx_t *self)
+{
+    atomic_store_explicit(&self->trace_stopped, false, memory_order_relaxed);
+}
 
 /** Sends what was posted, or lets the transmit context do it. Loop's thread, after posting, and as often as it likes. */
 void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x5229b1ba0bd6f56bu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_APP_H != 0x5229b1ba0bd6f56bu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x5229b1ba0bd6f56bu
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -271,6 +271,7 @@ const canopy_app_t cooler_app = {
     .acceptance = &cooler_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 4u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xa53678a8f65653c6u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x58b0a872dc8bdec9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_APP_H != 0x58b0a872dc8bdec9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x58b0a872dc8bdec9u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -125,6 +125,7 @@ const canopy_app_t room_app = {
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 4u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = memory.status,
