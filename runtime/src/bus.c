@@ -66,15 +66,13 @@ uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_
     return result;
 }
 
-/** Age of a frame, in whole ms, rounded up; CANOPY_AGE_MAX at most. */
-static uint16_t age_in_ms(canopy_time_t now, canopy_time_t arrived)
+/** An age in whole ms, rounded up; CANOPY_AGE_MAX at most. */
+static uint16_t age_in_ms(canopy_time_t age)
 {
-    canopy_time_t age = now - arrived;
-
     if (age <= MS * (CANOPY_AGE_MAX - 1u)) {
         return (uint16_t)(((uint32_t)age + MS - 1u) / MS); /* in 32 bits: there is a divider for them */
     }
-    return canopy_time_reached(now, arrived) ? CANOPY_AGE_MAX : 0u; /* 0: it has come since the cycle began */
+    return canopy_time_reached(age, 0) ? CANOPY_AGE_MAX : 0u; /* 0: it has come since the cycle began */
 }
 
 /** Notes when the values arrived that are in the input image now. What is not told in whole ms is not known. */
@@ -118,7 +116,7 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
         return;
     }
     canopy_count(&self->counters.accepted);
-    note_arrival(state, message, age_in_ms(now, frame->time), now);
+    note_arrival(state, message, age_in_ms(now - frame->time), now);
 }
 
 /** What a replay must know of a message in this tick goes into the check. */
@@ -133,15 +131,15 @@ static void begin_message(canopy_bus_state_t *self, uint16_t index, canopy_time_
 {
     const canopy_rx_message_t *message = &self->bus->rx[index];
     canopy_rx_state_t *state = &self->rx[index];
-    bool in_time = message->timeout == 0u || !canopy_time_reached(now, state->arrived_at + message->timeout);
-    bool fresh = state->received && in_time;
+    canopy_time_t age = now - state->arrived_at;
+    bool fresh = state->received && (message->timeout == 0u || age < message->timeout);
 
     if (state->fresh && !fresh) {
         canopy_count(&self->counters.timeouts);
     }
     state->received = fresh;
     state->fresh = fresh;
-    message->set_age(self->input, fresh, fresh ? age_in_ms(now, state->arrived_at) : CANOPY_AGE_MAX);
+    message->set_age(self->input, fresh, fresh ? age_in_ms(age) : CANOPY_AGE_MAX);
     if (state->taken) {
         check_age(self, state->age_ms);
     }

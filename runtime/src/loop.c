@@ -226,15 +226,16 @@ static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_
     const canopy_app_t *app = self->config->app;
 
     canopy_tx_resume_trace(app->tx);
-    canopy_trace_send(app->trace, app->trace_state, app->tree_instance, app->tx,
-                      &(canopy_trace_tick_t){.tick = self->ticks,
-                                             .root = root,
-                                             .overruns = self->overruns,
-                                             .cycle = cycle,
-                                             .bus = app->bus_state,
-                                             .returning = self->returning,
-                                             .until = cycle->now + (CANOPY_TRACE_PERIODS + app->trace_ticks) * app->period,
-                                             .is_filtered = self->config->can->is_filtered});
+    canopy_trace_send(
+        app->trace, app->trace_state, app->tree_instance, app->tx,
+        &(canopy_trace_tick_t){.tick = self->ticks,
+                               .root = root,
+                               .overruns = self->overruns,
+                               .cycle = cycle,
+                               .bus = app->bus_state,
+                               .returning = self->returning,
+                               .until = cycle->now + (CANOPY_TRACE_PERIODS + app->trace_ticks) * app->period,
+                               .is_filtered = self->config->can->is_filtered});
 }
 
 canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)

@@ -15,7 +15,7 @@
 #include "wire.h"
 
 #define RIG_BIT_RATE 500000u /**< If the options have none. */
-#define RIG_SEED 20261130u /**< Of the others' traffic, if the options have none. */
+#define RIG_SEED 20261130u   /**< Of the others' traffic, if the options have none. */
 
 /** What a rig is made of. All zero: one common controller with an interrupt, abort and filters; nobody else on the bus. */
 typedef struct {

@@ -203,16 +203,14 @@ static void check_slow_return(const rig_options_t *options, const char *what)
 static void test_a_slow_bus_gives_control_back(void)
 {
     for (uint8_t mailboxes = 1; mailboxes <= 3u; mailboxes += 2u) {
-        check_slow_return(&(rig_options_t){.app = &six_app,
-                                           .mailboxes = mailboxes,
-                                           .bit_rate = 50000,
-                                           .peer_period = 20u * NS_PER_MS},
-                          "50 kbit/s, some 3 commands a tick");
-        check_slow_return(&(rig_options_t){.app = &six_app,
-                                           .mailboxes = mailboxes,
-                                           .bit_rate = 10000,
-                                           .peer_period = 40u * NS_PER_MS},
-                          "10 kbit/s, less than one command a tick");
+        check_slow_return(
+            &(rig_options_t){
+                .app = &six_app, .mailboxes = mailboxes, .bit_rate = 50000, .peer_period = 20u * NS_PER_MS},
+            "50 kbit/s, some 3 commands a tick");
+        check_slow_return(
+            &(rig_options_t){
+                .app = &six_app, .mailboxes = mailboxes, .bit_rate = 10000, .peer_period = 40u * NS_PER_MS},
+            "10 kbit/s, less than one command a tick");
     }
 }
 

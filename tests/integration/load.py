@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Other traffic on a real bus: how old the data is that a leaf sees, and how long it takes to the safe value after a cut.
+"""Other traffic on a real bus: how old the data is that a leaf sees, and how long the safe value takes after a cut.
 
-Measured with nao_power (load_probe.c) and its robot (load_peer.c), whose frames the kernel stamps when they are on the bus,
-and compared with the compiler's bounds. These buses have no bit rate, so what is seen is the software's part.
+Measured with nao_power (load_probe.c) and its robot (load_peer.c), whose frames the kernel stamps when they are on the
+bus, and compared with the compiler's bounds. These buses have no bit rate, so what is seen is the software's part.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _run(helper: Callable[[str], Path], bus: str, load: int) -> _Seen:
 
 
 def _ages(seen: _Seen) -> list[int]:
-    """How old the Battery message is at each tick while the robot keeps to its cycle; and no tick is told a wrong age."""
+    """How old the Battery message is at each tick while the robot keeps to its cycle. No tick is told a wrong age."""
     sent = {message.level: message for message in seen.sent}
     ends = [message.after for message in seen.sent]
     ages = []

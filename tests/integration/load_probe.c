@@ -35,10 +35,8 @@ static bool after_cycle(void *context, canopy_status_t root)
 
     (void)context;
     (void)root;
-    ticks[tick_count++] = (tick_t){.now = in->now,
-                                   .level = (unsigned)in->battery.level,
-                                   .age_ms = in->battery.age_ms,
-                                   .fresh = in->battery.fresh};
+    ticks[tick_count++] = (tick_t){
+        .now = in->now, .level = (unsigned)in->battery.level, .age_ms = in->battery.age_ms, .fresh = in->battery.fresh};
     return tick_count < (unsigned)TICKS_MAX;
 }
 
@@ -46,8 +44,7 @@ int main(int argc, char **argv)
 {
     char message[CANOPY_CAN_OPEN_MESSAGE] = "load_probe BUS";
     const atomic_bool *stop = NULL;
-    canopy_loop_config_t config = {
-        .app = &nao_power_app, .clock = &posix_clock.clock, .after_cycle = after_cycle};
+    canopy_loop_config_t config = {.app = &nao_power_app, .clock = &posix_clock.clock, .after_cycle = after_cycle};
 
     if (argc != 2 || canopy_posix_stop_on_signals(&stop) != CANOPY_OK ||
         canopy_can_open(&port, argv[1], nao_power_app.acceptance, message, sizeof message) != CANOPY_OK) {

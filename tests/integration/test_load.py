@@ -9,7 +9,7 @@ import pytest
 from integration import load
 
 RECEIVE_THREAD_US = 20_000
-"""A frame is stamped when it is sent, but a thread of the driver takes it: it may be late, and the loop does not see that."""
+"""A frame is stamped when it is sent, but a thread of the driver takes it, and may be late unseen by the loop."""
 
 
 @pytest.mark.parametrize("percent", load.LOADS)

@@ -59,7 +59,7 @@ typedef enum {
     CANOPY_FAULT_RX_BACKLOG =
         4,                    /**< The second cycle in a row that left frames waiting; detail: cycles with a backlog. */
     CANOPY_FAULT_RX_LOST = 5, /**< The driver has lost received frames; detail: how many since the last cycle. */
-    CANOPY_FAULT_CAN_STATE = 6, /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
+    CANOPY_FAULT_CAN_STATE = 6,  /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
     CANOPY_FAULT_TX_EXPIRED = 7, /**< Commands were not out at their deadline; detail: how many since the last cycle. */
     CANOPY_FAULT_TX_REPLACED = 8 /**< Commands were not out when a newer value came; detail: the same. */
 } canopy_fault_t;
