@@ -130,22 +130,27 @@ static void read_link(canopy_socketcan_link_t *link, const char *answer, size_t 
     }
 }
 
-/** What an answer of the kernel says of a link. @return as canopy_socketcan_ask_link() */
-static canopy_error_t read_answer(canopy_socketcan_link_t *link, const struct nlmsghdr *answer, size_t size)
+/** What an answer of the kernel says of a link. @param answer `size` bytes @return as canopy_socketcan_ask_link() */
+static canopy_error_t read_answer(canopy_socketcan_link_t *link, const char *answer, size_t size)
 {
+    struct nlmsghdr header;
     struct nlmsgerr error;
 
-    if (size < NLMSG_LENGTH(0) || answer->nlmsg_len > size) {
+    if (size < NLMSG_HDRLEN) {
         return CANOPY_ERROR_UNSUPPORTED;
     }
-    if (answer->nlmsg_type == NLMSG_ERROR && answer->nlmsg_len >= NLMSG_LENGTH(sizeof error)) {
-        memcpy(&error, NLMSG_DATA(answer), sizeof error);
+    memcpy(&header, answer, sizeof header);
+    if (header.nlmsg_len > size) {
+        return CANOPY_ERROR_UNSUPPORTED;
+    }
+    if (header.nlmsg_type == NLMSG_ERROR && header.nlmsg_len >= NLMSG_LENGTH(sizeof error)) {
+        memcpy(&error, answer + NLMSG_HDRLEN, sizeof error);
         return error.error == -ENODEV ? CANOPY_ERROR_NOT_FOUND : CANOPY_ERROR_UNSUPPORTED;
     }
-    if (answer->nlmsg_type != RTM_NEWLINK || answer->nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
+    if (header.nlmsg_type != RTM_NEWLINK || header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
         return CANOPY_ERROR_UNSUPPORTED;
     }
-    read_link(link, (const char *)answer, answer->nlmsg_len);
+    read_link(link, answer, header.nlmsg_len);
     return CANOPY_OK;
 }
 
@@ -174,7 +179,7 @@ canopy_error_t canopy_socketcan_ask_link(const char *name, canopy_socketcan_link
         size = recv(socket_number, &answer, sizeof answer, MSG_DONTWAIT); /* the kernel answers within send() */
     }
     (void)close(socket_number);
-    return size >= 0 ? read_answer(link, &answer.header, (size_t)size) : CANOPY_ERROR_UNSUPPORTED;
+    return size >= 0 ? read_answer(link, answer.bytes, (size_t)size) : CANOPY_ERROR_UNSUPPORTED;
 }
 
 bool canopy_socketcan_may_switch(void)
