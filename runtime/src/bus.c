@@ -44,7 +44,9 @@ static uint16_t find(canopy_bus_state_t *self, uint32_t wanted)
     if (index >= bus->rx_count || rank_at(bus, index) != wanted) {
         index = search(bus, wanted);
     }
-    self->expected = (uint16_t)(index + 1u) < bus->rx_count ? (uint16_t)(index + 1u) : 0u;
+    if (index < bus->rx_count) {
+        self->expected = (uint16_t)(index + 1u) < bus->rx_count ? (uint16_t)(index + 1u) : 0u;
+    }
     return index;
 }
 
