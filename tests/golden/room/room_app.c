@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_APP_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -110,6 +110,7 @@ const canopy_app_t room_app = {
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 0u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = (uint8_t *)memory.status,
@@ -120,5 +121,5 @@ const canopy_app_t room_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = ROOM_NODES,
 };
