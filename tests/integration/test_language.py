@@ -108,7 +108,7 @@ def test_trees_of_a_ros_package_are_found_where_its_folder_is(tmp_path: Path) ->
     ("right", "wrong", "place", "texts"),
     [
         ("main_tree_to_execute", "main_tree_to_exec", "1:43", ["<root> has no attribute 'main_tree_to_exec'", "did you mean 'main_tree_to_execute'?"]),
-        ("<BehaviorTree ID", "<BehaviorTree Id='x' ID", "2:19", ["<BehaviorTree> has no attribute 'Id'", "known here: ID"]),
+        ("<BehaviorTree ID", "<BehaviorTree Id='x' ID", "2:19", ["<BehaviorTree> has no attribute 'Id'", "did you mean 'ID'?"]),
         ('default="3"', 'defualt="3"', "9:94", ["<input_port> has no attribute 'defualt'", "did you mean 'default'?"]),
         ('<Decorator ID="Guard"', '<Decorator ID="Guard" kind="x"', "17:29", ["<Decorator> has no attribute 'kind'"]),
     ],
@@ -140,7 +140,8 @@ SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
         ("<Sub/>", SUBTREE.format("<AlwaysSuccess/>"), "3:1", ["unknown node 'Sub'", '<SubTree ID="Sub"/>']),
         ("<SubTree ID='Sub'><Go/></SubTree>", SUBTREE.format("<AlwaysSuccess/>"), "3:19", ["cannot have children"]),
         ("<SubTree ID='Sub' _autoremap='maybe'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:31", ["neither true nor false"]),
-        ("<SubTree ID='Sub' _x='1'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:23", ["has no attribute '_x'"]),
+        ("<SubTree ID='Sub' _autoremp='1'/>", SUBTREE.format("<AlwaysSuccess/>"), "3:30",
+         ["has no attribute '_autoremp'", "did you mean '_autoremap'?"]),
         ("<Sequence><Find goal='{x}'/><Go speed='{x}'/></Sequence>", "", "3:40",
          ["port 'speed' of 'Go' is int32_t, but entry 'x' is int16_t", "the other end is port 'goal' of 'Find'", "3:23"]),
         ("<Sequence><Measure level='{x}'/><Fine level='{x}'/></Sequence>", "", "3:46",

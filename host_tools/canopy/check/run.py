@@ -49,6 +49,7 @@ class Report:
 
     findings: list[Finding] = field(default_factory=list)
     allowed: int = 0
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
     except CompileError as error:
         report.findings = _refused(path, wanted, error)
         return report
+    report.note = facts.tree.foreign.note()
     files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
     allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
     for places, comment in facts.bus.comments() if facts.bus is not None else ():

@@ -115,6 +115,10 @@ class Options:
     unset_ports: bool = False  # input ports may have neither a value nor a default: 0, false or NULL
     main_tree: str | None = None  # instead of the file's main_tree_to_execute
     any_type: bool = False  # types for which there is nothing in C are accepted
+    search: tuple[Path, ...] = ()  # folders, projects and files that trees and models are looked for in
+    draw: bool = False  # what is wrong is drawn as far as it can be
+    undeclared: bool = False  # nodes that nobody declared are taken as what they can be
+    foreign: frozenset[str] = frozenset()  # attributes and metadata of other tools that look like ours, misspelt
 
 
 # For tools that make no C.

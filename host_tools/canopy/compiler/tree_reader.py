@@ -11,14 +11,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
-from canopy.compiler.documents import Documents, read_documents
-from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.documents import PLAIN_ATTRIBUTES, Documents, read_documents
+from canopy.compiler.errors import CompileError, Errors, nearest
 from canopy.compiler.leaf_model import Leaf, Port
-from canopy.compiler.node_types import NodeType, Parameter, node_types
-from canopy.compiler.port_types import ANY, Options
+from canopy.compiler.node_types import NodeType, node_types
+from canopy.compiler.port_types import Options
 from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Context, attributes_node
-from canopy.compiler.tree import Bound, Node, Script, Tree
+from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
+from canopy.tree.node_id import id_of
+from canopy.tree.parameters import read_parameter
+from canopy.tree.undeclared import Unknown, stand_in
 
 __all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree", "read_unused_trees"]
 
@@ -26,8 +29,6 @@ MAX_NODES = 65_534
 MAX_SUBTREE_DEPTH = 1_000
 MAX_PATH = 4_000
 
-# Attributes that any node may have and that change nothing in a tick.
-PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath")
 CONDITION_ATTRIBUTES = (*PRECONDITIONS, *POSTCONDITIONS)
 
 # Kinds of the user's own nodes: their names in XML are those of the nodes.
@@ -41,11 +42,6 @@ NOT_SUPPORTED = frozenset(("ManualSelector",))
 
 EXPLICIT = {"Action": "LEAF", "Condition": "LEAF", "Control": "CONTROL", "Decorator": "DECORATOR"}
 
-# Least value of a parameter; the others may be any 32-bit number.
-LEAST = {"num_attempts": -1, "num_cycles": -1, "msec": 0, "delay_msec": 0, "then_skip": 0}
-# Parameters that are a number of children: 1 to N, or -1 (all) down to -N.
-THRESHOLDS = ("success_count", "failure_count", "max_failures")
-
 
 def built_in_types() -> dict[str, NodeType]:
     """The node types that XML can name and that have no script."""
@@ -53,7 +49,8 @@ def built_in_types() -> dict[str, NodeType]:
     return {name: kind for name, kind in node_types().items() if name not in hidden}
 
 
-def _built_in_names() -> frozenset[str]:
+def built_in_names() -> frozenset[str]:
+    """What a declaration cannot be called, but for the names that only Canopy has."""
     return frozenset((*built_in_types(), *SCRIPTED, *NOT_SUPPORTED, "SubTree", *EXPLICIT))
 
 
@@ -74,10 +71,17 @@ class _Instance:
 
 class _Builder:
     def __init__(self, documents: Documents, options: Options) -> None:
+        self._documents = documents
+        self._library = documents.library
         self._trees = documents.trees
         self._models = documents.declarations
+        self._foreign = documents.foreign
         self._built_in = built_in_types()
         self.context = Context(options, Blackboard())
+        self._known = {*self._built_in, *SCRIPTED, *NOT_SUPPORTED, ""}
+        self._unknown = Unknown()
+        self._sources = documents.files
+        self.errors = Errors()
         self.count = 0
         self.used: set[str] = set()
 
@@ -95,7 +99,13 @@ class _Builder:
                 node.children.append(outer)
                 if inner_element.children:
                     waiting.append((inner, inner_element, inner_instance))
-            self._check_handler(node)
+            try:
+                self._check_handler(node)
+            except CompileError as error:
+                self.errors.add(error)
+        self._unknown.report(self.errors, self._sources)
+        if not self.context.options.draw:
+            self.errors.raise_any()
         return root
 
     @staticmethod
@@ -111,6 +121,7 @@ class _Builder:
 
     def _main_ports(self, scope: Scope, tree_id: str) -> None:
         """The ports of the main tree are what the program itself writes and reads."""
+        self._library.add_ports(tree_id, self._trees[tree_id], self._documents)
         for port in self._models.subtrees.get(tree_id, ()):
             entry = scope.resolve(port.name, port.place)
             if isinstance(entry, Entry):
@@ -120,7 +131,8 @@ class _Builder:
     def _counted(self, node: Node) -> Node:
         self.count += 1
         if self.count > MAX_NODES:
-            raise CompileError(node.place, f"the tree has more than {MAX_NODES} nodes")
+            self.errors.add(CompileError(node.place, f"the tree has more than {MAX_NODES} nodes"))
+            self.errors.raise_any()
         return node
 
     def _expand(self, element: Element, instance: _Instance) -> tuple[Node, Node, Element, _Instance]:
@@ -131,9 +143,18 @@ class _Builder:
         outermost: Node | None = None
         above: Node | None = None
         while True:
-            attributes = attributes_node(self.context, element, instance.scope)
-            is_subtree = element.tag == "SubTree"
-            node = None if is_subtree else self._make(element, instance)
+            attributes: Node | None = None
+            node: Node | None = None
+            inner: _Instance | None = None
+            try:
+                attributes = attributes_node(self.context, element, instance.scope)
+                if element.tag == "SubTree":
+                    inner = self._enter(element, instance)
+                else:
+                    node = self._make(element, instance)
+            except CompileError as error:  # go on without it, to find what else is wrong
+                self.errors.add(error)
+                node = stand_in(element)
             for new in (attributes, node):
                 if new is None:
                     continue
@@ -143,19 +164,22 @@ class _Builder:
                     above.children.append(new)
                 outermost = outermost or new
                 above = new
-            if node is not None:
-                assert outermost is not None
+            if inner is None:
+                assert outermost is not None and node is not None
                 return outermost, node, element, instance
-            instance = self._enter(element, instance)
+            instance = inner
             element = self._trees[instance.chain[-1]].children[0]
 
     def _enter(self, element: Element, outer: _Instance) -> _Instance:
         """A new instance of the tree that a <SubTree> names."""
         tree_id = element.attributes.get("ID", "")
-        if tree_id not in self._trees:
+        if tree_id not in self._trees and not self._library.add_tree(tree_id, element, self._documents):
             raise CompileError(
-                element.attribute_place("ID"), f"<SubTree> names no tree: '{tree_id}'", nearest(tree_id, self._trees)
+                element.attribute_place("ID"),
+                f"<SubTree> names no tree: '{tree_id}'",
+                f"{nearest(tree_id, self._trees)}; the folder of a file that has it: --search DIR",
             )
+        self._library.add_ports(tree_id, element, self._documents)
         if tree_id in outer.chain:
             loop = " -> ".join((*outer.chain[outer.chain.index(tree_id) :], tree_id))
             raise CompileError(element.place, f"trees contain each other in a cycle: {loop}", "a tree has an end")
@@ -184,9 +208,8 @@ class _Builder:
             if name in plain:
                 continue
             if name.startswith("_"):
-                raise CompileError(
-                    element.attribute_place(name), f"<SubTree> has no attribute '{name}'", nearest(name, plain)
-                )
+                self._foreign.leave(name, element.attribute_place(name), "<SubTree>", plain)
+                continue
             if not name.isidentifier():
                 raise CompileError(element.attribute_place(name), f"'{name}' cannot be the name of a port")
             scope.connect(name, text, element.attribute_place(name))
@@ -205,14 +228,16 @@ class _Builder:
                 target.connect(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
 
     def _make(self, element: Element, instance: _Instance) -> Node:
-        node_id = element.attributes.get("ID", "") if element.tag in EXPLICIT else element.tag
-        if node_id in SCRIPTED:
+        node_id = id_of(element)
+        if node_id not in self._known:
+            self._library.add_model(node_id, element, self._documents)
+        if node_id in self._models.leaves:  # first: the user's node may have the name of one that only Canopy has
+            node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
+        elif node_id in SCRIPTED:
             node = SCRIPTED[node_id](self.context, element, instance.scope, node_id)
             self._check_plain(element)
         elif node_id in self._built_in:
             node = self._built_in_node(element, self._built_in[node_id], instance.scope)
-        elif node_id in self._models.leaves:
-            node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
         elif node_id in NOT_SUPPORTED:
             raise CompileError(
                 element.place, f"<{node_id}> is not supported", "declare a node of your own in its place"
@@ -220,9 +245,11 @@ class _Builder:
         elif element.tag in EXPLICIT and not node_id:
             raise CompileError(element.place, f"<{element.tag}> needs the attribute ID")
         else:
-            known = [*self._models.leaves, *self._built_in, *SCRIPTED]
-            hint = f'it is a tree: <SubTree ID="{node_id}"/>' if node_id in self._trees else nearest(node_id, known)
-            raise CompileError(element.place, f"unknown node '{node_id}'", hint)
+            if node_id in self._trees:
+                message = f"unknown node '{node_id}'"
+                raise CompileError(element.place, message, f'it is a tree: <SubTree ID="{node_id}"/>')
+            self._unknown.add(node_id, element.place, (*self._models.leaves, *self._known))
+            return stand_in(element)
         wanted = EXPLICIT.get(element.tag)
         is_condition = node.type.name == "Condition"
         if wanted is not None and (
@@ -244,26 +271,33 @@ class _Builder:
         return node
 
     def _check_plain(self, element: Element) -> None:
+        """Looks at the attributes that begin with `_`: those of other tools are left alone."""
         allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES}
         for name in element.attributes:
             if name.startswith("_") and name not in allowed:
-                raise CompileError(
-                    element.attribute_place(name), f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed)
-                )
+                self._foreign.leave(name, element.attribute_place(name), f"<{element.tag}>", allowed)
 
     def _check_attributes(self, element: Element, own: set[str]) -> None:
         allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, *own} | ({"ID"} if element.tag in EXPLICIT else set())
         for name in element.attributes:
-            if name not in allowed:
+            if name not in allowed and not name.startswith("_"):
                 raise CompileError(element.place, f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed))
+        self._check_plain(element)
 
     def _leaf_node(self, element: Element, leaf: Leaf, scope: Scope) -> Node:
         if leaf.problem is not None:
             raise leaf.problem
         self._check_attributes(element, {port.name for port in leaf.ports})
-        bound = tuple(self._bind(element, leaf, port, scope) for port in leaf.ports)
+        bound = tuple(self._bind_or_not(element, leaf, port, scope) for port in leaf.ports)
         name = element.attributes.get("name", leaf.id)
         return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
+
+    def _bind_or_not(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
+        try:
+            return self._bind(element, leaf, port, scope)
+        except CompileError as error:
+            self.errors.add(error)
+            return Bound(port, element.place)
 
     def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
         # Groot2 writes an empty attribute for a port that nothing is connected to.
@@ -298,44 +332,9 @@ class _Builder:
     def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
         own = {parameter.name for parameter in kind.parameters}
         self._check_attributes(element, own)
-        parameters = tuple(self._parameter(element, parameter, scope) for parameter in kind.parameters)
+        parameters = tuple(read_parameter(self.context, element, each, scope) for each in kind.parameters)
         name = element.attributes.get("name", kind.name)
         return Node(kind, name, element.place, parameters, xml_name=kind.name)
-
-    def _parameter(self, element: Element, parameter: Parameter, scope: Scope) -> int | Script:
-        name = parameter.name
-        text = element.attributes.get(name, parameter.default)
-        if not text:
-            raise CompileError(element.place, f"<{element.tag}> needs the attribute {name}", f'for example {name}="3"')
-        if pointer(text, name) is not None:
-            return self._entry_parameter(element, name, scope)
-        if text in ("true", "false"):
-            text = "1" if text == "true" else "0"
-        try:
-            value = int(text)
-        except ValueError:
-            raise CompileError(element.place, f"{name}='{text}' is not a whole number") from None
-        least = LEAST.get(name, -(2**31))
-        if not least <= value < 2**31:
-            raise CompileError(element.place, f"{name}={value} is outside [{least}, {2**31 - 1}]")
-        count = len(element.children)
-        if name in THRESHOLDS and not (1 <= value <= count or -count <= value <= -1):
-            raise CompileError(
-                element.place,
-                f"{name}={value} can never be met by {count} children, or needs none",
-                f"1 to {count}, or -1 (all) down to -{count}",
-            )
-        return value
-
-    def _entry_parameter(self, element: Element, name: str, scope: Scope) -> Script:
-        script = self.context.script("parameter", element, name, scope)
-        inner = pointer(script.text, name)
-        assert inner is not None
-        script.target = scope.resolve(inner, script.place())
-        script.least = LEAST.get(name, -(2**31))
-        if isinstance(script.target, Entry):
-            script.target.connect(Use(ANY, script.place(), f"<{element.tag} {name}>", False))
-        return script
 
 
 def read_tree(path: Path, options: Options | None = None) -> Tree:
@@ -345,7 +344,7 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
         CompileError: anything in the file, or in those it includes, that cannot be compiled.
     """
     options = options or Options()
-    documents = read_documents(path, options, _built_in_names())
+    documents = read_documents(path, options, built_in_names())
     tree = _expand(path, documents, _Builder(documents, options), documents.main)
     own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
     return replace(tree, unused={name: element for name, element in own.items() if name not in tree.used})
@@ -353,7 +352,7 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
 
 def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tuple[str, Tree | CompileError]]:
     """The file's trees that are no part of its main tree: each that is no part of another one, or why it cannot be."""
-    documents = read_documents(path, options, _built_in_names())
+    documents = read_documents(path, options, built_in_names())
     inner = {ref for element in tree.unused.values() for ref in _subtrees(element)}
     seen: set[str] = set()
     nodes = 0
@@ -396,4 +395,6 @@ def _expand(path: Path, documents: Documents, builder: _Builder, tree_id: str) -
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
         used=frozenset(builder.used),
+        problems=len(builder.errors),
+        foreign=documents.foreign,
     )

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.errors import CompileError, Place
 from canopy.files import FileError, read_bytes
+from canopy.tree.foreign import Foreign
 
 MAX_DEPTH = 65_534
 
@@ -50,16 +51,15 @@ class Element:
             start = starts[index] if index < len(starts) else end
         return self._place_of(start)
 
-    def only(self, *known: str) -> None:
-        """Refuses an attribute that is not known; not those of other namespaces, and what editors keep (`_…`).
+    def only(self, foreign: Foreign, *known: str) -> None:
+        """Looks at attributes that are not known: those of other namespaces are nobody's, others are `foreign`.
 
         Raises:
-            CompileError: with the attribute's place, and the nearest name.
+            CompileError: one looks like a known one, misspelt.
         """
         for name in self.attributes:
-            if name not in known and ":" not in name and not name.startswith(("_", "xmlns")):
-                place = self.attribute_place(name)
-                raise CompileError(place, f"<{self.tag}> has no attribute '{name}'", nearest(name, known))
+            if name not in known and ":" not in name and name != "xmlns":
+                foreign.leave(name, self.attribute_place(name), f"<{self.tag}>", known)
 
     def _read_again(self) -> dict[bytes, tuple[int, int]]:
         """Where each attribute's value begins and ends."""
