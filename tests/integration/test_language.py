@@ -157,7 +157,7 @@ SUBTREE = '<BehaviorTree ID="Sub">{}</BehaviorTree>'
         ("<Sequence><Measure level='{x}'/><Script code='y := x'/></Sequence>", "", "3:47", ["entry 'y' would hold fractions", "type=\"int32_t*0.01\"/>"]),
         ("<Go speed='{x}'/>", "", "3:12", ["nothing writes entry 'x'", "ports of the main tree"]),
         ("<Find goal='5'/>", "", "3:13", ["'5' is a literal", "give an entry: {name}"]),
-        ("<Go speed='{a b}'/>", "", "3:12", ["'a b' is not the name of an entry"]),
+        ("<Go speed='{a;b}'/>", "", "3:12", ["'a;b' is not the name of an entry"]),
         ("<Say text='{t}'/>", "", "3:12", ["nothing writes entry 't'"]),
         ("<Sequence><Script code='t := 5'/><Say text='{t}'/></Sequence>", "", "3:30", ["the number 5 cannot be stored as a text"]),
         ("<Go speed='{Climate.Temperature}'/>", "", "3:12", ["port 'speed' of 'Go': a number in steps of 0.5 would lose precision"]),

@@ -263,6 +263,13 @@ class _Binder:
         if not entry.uses or entry.is_constant or id(entry) in self._failed:
             return
         use = entry.uses[0]
+        message = entry.name.partition(".")[0]
+        if "." in entry.name and any(message == other.name for other in (*self._bus.receive, *self._bus.send)):
+            raise CompileError(
+                use.place,
+                f"'{entry.name}' is written by a node, and '{message}' is a message of the bus",
+                "give the entry another name",
+            )
         if entry.initial is None and not entry.is_written:
             scope = f" of '{entry.path}'" if entry.path else ""
             known = [e.name for e in self._tree.board.entries if e.path == entry.path and e is not entry]

@@ -9,14 +9,16 @@ from functools import cached_property
 from canopy.compiler.blackboard import Entry, SignalName
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.leaf_model import Leaf, Port
-from canopy.compiler.port_types import BOOL, INT32, INT64, TEXT, PortType, literal
-from canopy.compiler.script.compile import Compiler, Texts, guess
+from canopy.compiler.leaf_model import Leaf
+from canopy.compiler.port_types import PortType, literal
+from canopy.compiler.script.compile import Compiler, Texts
 from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import ScriptError
-from canopy.compiler.script.values import Const, Double, TextConst
+from canopy.compiler.script.values import Double
 from canopy.compiler.tree import Bound, Node, Tree
 from canopy.escape.c import mark_c
+from canopy.tree.generic import VALUE, generic_type, value_of
+from canopy.tree.lists import queue_literal
 
 
 @dataclass(frozen=True)
@@ -72,10 +74,8 @@ class Ports:
                     message = bound.target.text.partition(".")[0]
                     if not bound.target.text.endswith(".fresh") and message not in leaf.reads:
                         leaf = replace(leaf, reads=(*leaf.reads, message))
-            if node.bound:
-                both = zip(leaf.ports, node.bound, strict=True)
-                leaf = replace(leaf, ports=tuple(self._settled(port, bound) for port, bound in both))
             leaves[leaf.id] = leaf
+        self._settle_generic(leaves)
         for node in self._nodes:
             if node.leaf is not None:
                 node.leaf = leaves[node.leaf.id]
@@ -83,16 +83,18 @@ class Ports:
                     bound.port = port
         return leaves
 
-    @staticmethod
-    def _settled(port: Port, bound: Bound) -> Port:
-        if port.type.kind != "any":
-            return port
-        if isinstance(bound.target, Entry):
-            kind = bound.target.type
-            if bound.target.is_constant:
-                kind = _literal_kind(bound.target.initial or "")
-            return replace(port, type=kind) if kind.kind != "any" else port
-        return replace(port, type=_literal_kind(bound.text or "")) if bound.text is not None else port
+    def _settle_generic(self, leaves: dict[str, Leaf]) -> None:
+        """Gives ports without a type the one that all their uses have."""
+        uses: dict[tuple[str, int], list[Bound]] = {}
+        for node in self._nodes:
+            if node.leaf is not None:
+                for place, bound in enumerate(node.bound):
+                    if bound.port.type.kind == "any":
+                        uses.setdefault((node.leaf.id, place), []).append(bound)
+        for (leaf_id, place), bounds in uses.items():
+            ports = list(leaves[leaf_id].ports)
+            ports[place] = replace(ports[place], type=generic_type(bounds, self._floats))
+            leaves[leaf_id] = replace(leaves[leaf_id], ports=tuple(ports))
 
     def bound(self, node: Node, bound: Bound, bindings: Bindings) -> BoundPort:
         """One port of one node.
@@ -103,15 +105,21 @@ class Ports:
         assert node.leaf is not None
         port = bound.port
         where = f"port '{port.name}' of '{node.leaf.id}'"
-        if port.type.kind == "any":
-            raise CompileError(bound.place, f"{where}: nothing gives it a type", f"declare it, at {port.place}")
         if isinstance(bound.target, Entry):
             return self._connected(node.leaf, bound, bound.target, where, bindings)
         if isinstance(bound.target, SignalName):
             return self._signal(bound, bound.target, where)
         if bound.text is None:  # nothing is connected
             return _bound_port("NULL" if port.writes or port.type.kind == "user" else _zero(port.type))
-        return _bound_port(_constant(bound.text, port.type, where, bound.place))
+        return _bound_port(self._constant(bound.text, port.type, where, bound.place))
+
+    def _constant(self, text: str, kind: PortType, where: str, place: Place) -> str:
+        if kind == VALUE:
+            return f"{{{value_of(text, self._floats)}}}"
+        if kind.item:
+            return f"&(const {kind.c}){{{queue_literal(text, kind, where, place, self._texts)}}}"
+        c = literal(text, kind, where, place)
+        return f"&(const {kind.c}){{{c}}}" if kind.kind == "user" else c
 
     def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
         kind = bound.port.type
@@ -128,7 +136,9 @@ class Ports:
     def _connected(self, leaf: Leaf, bound: Bound, entry: Entry, where: str, bindings: Bindings) -> BoundPort:
         port = bound.port
         if entry.is_constant:
-            return _bound_port(_constant(entry.initial or "", port.type, where, entry.place))
+            return _bound_port(self._constant(entry.initial or "", port.type, where, entry.place))
+        if port.type == VALUE:
+            return _bound_port(_zero(port.type), f"({port.type.c}){{{self._value(entry, where, bound.place)}}}")
         if entry.type != port.type:
             first = next((use for use in entry.uses if use.type == entry.type), entry.uses[0])
             raise CompileError(
@@ -144,27 +154,27 @@ class Ports:
         if port.type.kind == "user":
             return _bound_port(f"&memory.entries.{entry.c_name}")
         if port.type.kind == "text":
-            place, texts = f"app->entries.{entry.c_name}", f"{self._name}_texts"
-            # A leaf may have written any number.
-            return _bound_port("NULL", f"{texts}[{place} < {texts.upper()} ? {place} : 0u]")
+            return _bound_port("NULL", self._text_of(entry))
         return _bound_port(_zero(port.type), f"app->entries.{entry.c_name}")
 
+    def _text_of(self, entry: Entry) -> str:
+        """The text that an entry holds; a leaf may have written any number."""
+        place, texts = f"app->entries.{entry.c_name}", f"{self._name}_texts"
+        return f"{texts}[{place} < {texts.upper()} ? {place} : 0u]"
 
-def _literal_kind(text: str) -> PortType:
-    value = guess(text)
-    if isinstance(value, TextConst) or not isinstance(value, Const):
-        return TEXT
-    if value.is_bool:
-        return BOOL
-    if value.value.denominator != 1:
-        return TEXT
-    return INT32 if -(2**31) <= value.value < 2**31 else INT64
+    def _value(self, entry: Entry, where: str, place: Place) -> str:
+        """The members of a value that an entry gives."""
+        if entry.type.kind == "text":
+            return f".kind = CANOPY_VALUE_TEXT, .text = {self._text_of(entry)}"
+        member = f"app->entries.{entry.c_name}"
+        if entry.type.kind == "float":
+            return f".kind = CANOPY_VALUE_REAL, .real = {member}"
+        if entry.type.kind not in ("int", "bool", "duration") or entry.type.high >= 2**63:
+            raise CompileError(
+                place, f"{where} has no type, and the entry is {entry.type}", "declare a type: its uses have several"
+            )
+        return f".kind = CANOPY_VALUE_NUMBER, .number = {member}"
 
 
 def _zero(kind: PortType) -> str:
-    return {"bool": "false", "float": "0", "text": "NULL"}.get(kind.kind, "0")
-
-
-def _constant(text: str, kind: PortType, where: str, place: Place) -> str:
-    c = literal(text, kind, where, place)
-    return f"&(const {kind.c}){{{c}}}" if kind.kind == "user" else c
+    return {"bool": "false", "float": "0", "text": "NULL", "value": "{.kind = CANOPY_VALUE_NONE}"}.get(kind.kind, "0")

@@ -18,7 +18,7 @@ from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
 from canopy.compiler.limits import BITRATE, PERIOD_MS, Limits
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.output import INPUT_ERROR, dependencies, fail, print_note, write_or_exit
-from canopy.compiler.port_types import Options, is_fixed_point
+from canopy.compiler.port_types import Options, is_fixed_point, is_queue
 from canopy.compiler.stubs import stubs
 from canopy.escape import c
 from canopy.escape.json_text import dumps
@@ -184,7 +184,7 @@ def read_type_options(
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type) or is_queue(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
     if include is not None:

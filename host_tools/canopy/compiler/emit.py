@@ -31,6 +31,7 @@ from canopy.compiler.leaf_c import (
     entry_note,
     entry_type,
     function_names,
+    has_setter,
     item_type,
     parameters,
     port_members,
@@ -50,6 +51,7 @@ from canopy.compiler.tree_reader import read_tree
 from canopy.escape import c_templates
 from canopy.escape.c import header, string
 from canopy.escape.json_text import dumps
+from canopy.tree.generic import VALUE
 
 MODEL_FORMAT = 1
 
@@ -249,6 +251,7 @@ def environment(bus: Bus) -> jinja2.Environment:
         "function_names_of": function_names,
         "port_members": port_members,
         "setter": setter,
+        "has_setter": has_setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
         "item_type": item_type,
@@ -287,6 +290,7 @@ def render(application: Application) -> dict[str, bytes]:
         "texts": bindings.texts,
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
+        "has_values": any(p.type == VALUE for use in application.table.users for p in use.leaf.ports),
         "image": application.images,
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }

@@ -34,7 +34,7 @@ from typing import Literal
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
 from canopy.compiler.limits import PORTS_MAX
 from canopy.compiler.names import is_c_identifier, snake
-from canopy.compiler.port_types import Options, PortType, read_type
+from canopy.compiler.port_types import Options, PortType, is_optional, read_type
 from canopy.compiler.xml_reader import Element
 from canopy.tree.built_in import is_built_in
 from canopy.tree.foreign import Foreign
@@ -79,7 +79,7 @@ class Port:
     description: str
     place: Place = field(compare=False)
     direction: Literal["in", "out", "inout"] = "in"
-    capacity: int = 0
+    is_optional: bool = False
 
     @cached_property
     def c_name(self) -> str:
@@ -167,6 +167,7 @@ def _read_port(element: Element, options: Options, foreign: Foreign) -> Port:
         element.text.strip(),
         element.place,
         PORT_TAGS[element.tag],
+        is_optional(element.attributes.get("type", "")),
     )
 
 

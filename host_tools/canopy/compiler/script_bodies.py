@@ -13,6 +13,7 @@ from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
 from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
 from canopy.compiler.tree import Script
 from canopy.escape.c import emits_c
+from canopy.tree.lists import items_of, queue_literal
 
 
 def entry_value(script: Script) -> Entry | SignalName | str:
@@ -99,13 +100,13 @@ class Bodies:
     def _take(self, compiler: Compiler, script: Script) -> list[str]:
         assert isinstance(script.target, Entry)
         assert script.type is not None
-        if script.queue is not None:
+        if script.queue is not None and not script.queue.is_constant:
             return self._take_from_entry(compiler, script, script.queue, script.target)
         assert script.state is not None
         place = script.place()
-        texts = [text.strip() for text in script.text.split(";") if text.strip()]
+        texts = items_of(script.text if script.queue is None else script.queue.initial or "")
         if not texts:
-            raise ScriptError(0, "the list is empty", 'for example queue="1;2;3"')
+            return ["return 0; /* the list is empty */"]
         count(texts, "items of the list", place)
         if script.type == TEXT:
             items, c_type = [f"{self._texts.index(text)}u" for text in texts], "uint16_t"
@@ -183,6 +184,10 @@ def initial_lines(entry: Entry, texts: Texts) -> list[str]:
     if entry.initial is not None and entry.type == TEXT:
         return [f"{member} = {texts.index(entry.initial)}u;"]
     if entry.initial is not None:
+        if entry.type.item:
+            where = f"entry {entry.name!r}"
+            c = queue_literal(entry.initial, entry.type, where, entry.place, texts)
+            return [f"{member} = ({entry.type.c}){{{c}}};"]
         return [f"{member} = {literal(entry.initial, entry.type, f'entry {entry.name!r}', entry.place)};"]
     if entry.type.kind == "user":
         return [f"memset(&{member}, 0, sizeof {member});"]

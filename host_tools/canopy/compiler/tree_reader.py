@@ -6,6 +6,7 @@ A <SubTree> costs no node: the root of its tree stands in its place, with a scop
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,8 +20,11 @@ from canopy.compiler.port_types import Options
 from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Context, attributes_node
 from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
+from canopy.tree.built_in import CANOPY_ONLY, is_users
 from canopy.tree.node_id import id_of
 from canopy.tree.parameters import read_parameter
+from canopy.tree.ports import bind_port, dotted_names
+from canopy.tree.search import complete
 from canopy.tree.undeclared import Unknown, stand_in
 
 __all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree", "read_unused_trees"]
@@ -78,7 +82,7 @@ class _Builder:
         self._foreign = documents.foreign
         self._built_in = built_in_types()
         self.context = Context(options, Blackboard())
-        self._known = {*self._built_in, *SCRIPTED, *NOT_SUPPORTED, ""}
+        self._known = {*self._built_in, *SCRIPTED, *NOT_SUPPORTED, ""} - {*CANOPY_ONLY}
         self._unknown = Unknown()
         self._sources = documents.files
         self.errors = Errors()
@@ -87,6 +91,9 @@ class _Builder:
 
     def build(self, tree_id: str) -> Node:
         """The whole tree. A loop, not recursion: trees may be as deep as they are large."""
+        with contextlib.suppress(CompileError):  # what is wrong is said where it is used
+            complete(self._documents, built_in_names(), tree_id)
+        self.context.board.dotted = dotted_names(self._documents)
         main = _Instance(self.context.board.main, tree_id, (tree_id,))
         self.used.add(tree_id)
         self._main_ports(main.scope, tree_id)
@@ -123,9 +130,11 @@ class _Builder:
         """The ports of the main tree are what the program itself writes and reads."""
         self._library.add_ports(tree_id, self._trees[tree_id], self._documents)
         for port in self._models.subtrees.get(tree_id, ()):
-            entry = scope.resolve(port.name, port.place)
+            inner = pointer(port.default or "", port.name)
+            entry = scope.resolve(inner or port.name, port.place)
+            scope.names.setdefault(port.name, entry)
             if isinstance(entry, Entry):
-                entry.initial = port.default
+                entry.initial = port.default if inner is None else None
                 entry.connect(Use(port.type, port.place, f"port '{port.name}' of the main tree", True))
 
     def _counted(self, node: Node) -> Node:
@@ -233,6 +242,9 @@ class _Builder:
             self._library.add_model(node_id, element, self._documents)
         if node_id in self._models.leaves:  # first: the user's node may have the name of one that only Canopy has
             node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
+        elif is_users(element, node_id):
+            self._unknown.add(node_id, element.place, ())
+            return stand_in(element)
         elif node_id in SCRIPTED:
             node = SCRIPTED[node_id](self.context, element, instance.scope, node_id)
             self._check_plain(element)
@@ -248,7 +260,7 @@ class _Builder:
             if node_id in self._trees:
                 message = f"unknown node '{node_id}'"
                 raise CompileError(element.place, message, f'it is a tree: <SubTree ID="{node_id}"/>')
-            self._unknown.add(node_id, element.place, (*self._models.leaves, *self._known))
+            self._unknown.add(node_id, element.place, (*self._models.leaves, *self._known, *CANOPY_ONLY))
             return stand_in(element)
         wanted = EXPLICIT.get(element.tag)
         is_condition = node.type.name == "Condition"
@@ -294,40 +306,10 @@ class _Builder:
 
     def _bind_or_not(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
         try:
-            return self._bind(element, leaf, port, scope)
+            return bind_port(self.context, element, leaf, port, scope)
         except CompileError as error:
             self.errors.add(error)
             return Bound(port, element.place)
-
-    def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
-        # Groot2 writes an empty attribute for a port that nothing is connected to.
-        given = port.name in element.attributes and (element.attributes[port.name] != "" or port.type.kind == "text")
-        text = element.attributes[port.name] if given else port.default
-        place = element.attribute_place(port.name) if given else element.place
-        if text is None:
-            if port.direction == "out" or self.context.options.unset_ports:
-                return Bound(port, place)
-            raise CompileError(
-                element.place,
-                f"'{leaf.id}' needs a value for its port '{port.name}'",
-                f"or give the port a default where it is declared: {port.place}; or take 0, false or NULL for all such "
-                "ports: --allow-unset-ports",
-            )
-        name = pointer(text, port.name)
-        if name is None:
-            if port.writes:
-                raise CompileError(
-                    place,
-                    f"port '{port.name}' of '{leaf.id}' is written, and '{text}' is a literal",
-                    "give an entry: {name}",
-                )
-            return Bound(port, place, text=text)
-        target = scope.resolve(name, place)
-        if isinstance(target, Entry):
-            target.connect(Use(port.type, place, f"port '{port.name}' of '{leaf.id}'", port.writes))
-        elif port.writes:
-            raise CompileError(place, f"port '{port.name}' of '{leaf.id}' is written, and '{name}' is a signal")
-        return Bound(port, place, target=target)
 
     def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
         own = {parameter.name for parameter in kind.parameters}

@@ -83,6 +83,20 @@ def is_built_in(element: Element, ours: tuple[str, ...]) -> bool:
     return True
 
 
+def is_users(element: Element, name: str) -> bool:
+    """Is this node, which no file declares, the user's own, though Canopy has one of that name?
+
+    BehaviorTree.CPP does not have it, and the node has attributes that ours does not have.
+    """
+    if name not in CANOPY_ONLY:
+        return False
+    ours = {port.name for port in built_in_models()[name][1]}
+    return any(
+        attribute not in ours and attribute not in ("ID", "name") and not attribute.startswith("_")
+        for attribute in element.attributes
+    )
+
+
 def built_in_xml() -> str:
     """A file that declares all built-in nodes, for an editor that does not know them."""
     lines = ['<root BTCPP_format="4">', "  <TreeNodesModel>"]

@@ -96,6 +96,7 @@ class _Guesser:
         self._types: dict[Key, PortType] = {}
         self._entries: dict[Key, list[Use]] = defaultdict(list)
         self._first: dict[Key, int] = {}
+        self._scripted = {usage.root(key) for key in usage.scripted}
         for key, kind in usage.types.items():
             self._types.setdefault(usage.root(key), kind)
         for key, order in usage.first.items():
@@ -209,9 +210,9 @@ class _Guesser:
                     port.type, port.why = None, "its uses have several types"
 
     def _inputs(self) -> None:
-        """Entries that still nobody writes."""
+        """Entries that still nobody writes, and those that only ports without a type are connected to."""
         for root in sorted({*self._entries, *self._first}):
-            if root in self._written:
+            if root in self._written and (root in self._types or root in self._entries or root in self._scripted):
                 continue
             for tree_id, name in self._main_names(root):
                 self.guess.inputs.setdefault(tree_id, {}).setdefault(name, self._types.get(root, INT32))

@@ -19,6 +19,7 @@ from canopy.compiler.leaf_model import MODEL_TAGS, Declarations, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, parse_xml
 from canopy.files import FileError, read_bytes
+from canopy.tree.built_in import CANOPY_ONLY
 from canopy.tree.node_id import id_of
 
 if TYPE_CHECKING:
@@ -171,21 +172,25 @@ class Library:
             documents.files.append(path)
 
     def add_ports(self, tree_id: str, asking: Element, documents: Documents) -> None:
-        """Adds the ports of a tree, where its files do not declare them and a file does that --search names itself.
+        """Adds ports of a tree that its files do not declare, from a file that --search names itself.
 
         Other files may have another tree of that name.
 
         Raises:
             CompileError: a declaration is wrong.
         """
-        if tree_id in documents.declarations.subtrees:
-            return
         self._read_all()
-        candidates = self._nearest(self._ports.get(tree_id, []), asking)
-        if candidates:
-            model = Element("TreeNodesModel", {}, candidates[0].place, [candidates[0]])
-            read_model(model, documents.declarations, self._options, self._built_in, documents.foreign)
-            self._took(candidates[0], documents)
+        candidates = self._nearest(self._ports.pop(tree_id, []), asking)
+        if not candidates:
+            return
+        found = Declarations()
+        model = Element("TreeNodesModel", {}, candidates[0].place, [candidates[0]])
+        read_model(model, found, self._options, self._built_in, documents.foreign)
+        declared = documents.declarations.subtrees.get(tree_id, ())
+        names = {port.name for port in declared}
+        more = tuple(port for port in found.subtrees[tree_id] if port.name not in names)
+        documents.declarations.subtrees[tree_id] = (*declared, *more)
+        self._took(candidates[0], documents)
 
     def add_model(self, node_id: str, asking: Element, documents: Documents) -> None:
         """Adds the declaration of that node, where it has none and a file that is searched has one.
@@ -218,22 +223,26 @@ class Library:
         self._took(candidates[0], documents)
 
 
-def complete(documents: Documents, built_in: frozenset[str]) -> None:
-    """Adds what the trees use and other files have, as far as they are searched.
+def complete(documents: Documents, built_in: frozenset[str], start: str | None = None) -> None:
+    """Adds what the trees use and other files have, as far as they are searched. `start`: only what this tree uses.
 
     Raises:
         CompileError: several files have it, and differ.
     """
-    waiting = list(documents.trees.values())
+    waiting = list(documents.trees.values()) if start is None else [documents.trees[start]]
+    seen = set(documents.trees) if start is None else {start}
     while waiting:
         element = waiting.pop()
         waiting.extend(element.children)
         name = id_of(element)
         if element.tag == "SubTree":
             tree_id = element.attributes.get("ID", "")
-            if tree_id not in documents.trees and documents.library.add_tree(tree_id, element, documents):
+            if tree_id not in documents.trees:
+                documents.library.add_tree(tree_id, element, documents)
+            if tree_id in documents.trees and tree_id not in seen:
+                seen.add(tree_id)
                 waiting.append(documents.trees[tree_id])
-        elif name and name not in built_in:
+        elif name and (name not in built_in or name in CANOPY_ONLY):
             documents.library.add_model(name, element, documents)
-    for tree_id, element in documents.trees.items():
+    for tree_id, element in list(documents.trees.items()):
         documents.library.add_ports(tree_id, element, documents)

@@ -13,9 +13,9 @@ from canopy.compiler.documents import PLAIN_ATTRIBUTES, Documents, roots
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.port_types import PortType
 from canopy.compiler.script.syntax import Assignment, Name, ScriptError, parse, parts
-from canopy.compiler.scripted import LOOP_ITEMS, POSTCONDITIONS, PRECONDITIONS, SCRIPTED
+from canopy.compiler.scripted import LOOP_ITEMS, POSTCONDITIONS, PRECONDITIONS
 from canopy.compiler.xml_reader import Element
-from canopy.tree.built_in import built_in_models
+from canopy.tree.built_in import built_in_models, is_users
 from canopy.tree.node_id import id_of
 
 Key = tuple[int, str, str]
@@ -40,11 +40,16 @@ class Use:
 
 @dataclass
 class Usage:
-    """What was found. `first` is the order of the first mention of an entry by anything but an undeclared node."""
+    """What was found.
+
+    `scripted`: what scripts and literals give a type; `first`: the order of the first mention of an entry by anything but
+    an undeclared node; `mains`: the trees that can be main ones.
+    """
 
     uses: list[Use] = field(default_factory=list)
     nodes: dict[str, list[Element]] = field(default_factory=dict)
     written: set[Key] = field(default_factory=set)
+    scripted: set[Key] = field(default_factory=set)
     types: dict[Key, PortType] = field(default_factory=dict)
     first: dict[Key, int] = field(default_factory=dict)
     mains: dict[int, list[str]] = field(default_factory=dict)
@@ -77,7 +82,13 @@ class Usage:
 
     def add(self, number: int, documents: Documents) -> None:
         """Looks at all trees of one file and of what it includes."""
-        mains = self.mains[number] = roots(list(documents.trees), documents.trees)
+        file = documents.top.place.file if documents.top is not None else ""
+        own = [name for name, tree in documents.trees.items() if tree.place.file == file]
+        first = documents.top.attributes.get("main_tree_to_execute", "") if documents.top is not None else ""
+        of_all = roots(list(documents.trees), documents.trees)
+        mains = list(dict.fromkeys([first] if first in documents.trees else []))
+        mains += [name for name in (*roots(own, documents.trees), *of_all) if name not in mains]
+        self.mains[number] = mains
         for tree_id in mains:
             self._main_ports(number, tree_id, documents)
         walk = _Walk(self, number, documents)
@@ -134,12 +145,15 @@ class _Walk:
 
     def _subtree(self, here: str, element: Element) -> None:
         inner = element.attributes.get("ID", "")
+        if inner in self._usage.mains[self._number]:
+            return  # it is also compiled alone, and then nobody gives it anything
         given = {name: text for name, text in element.attributes.items() if name not in _PLAIN and name[:1] != "_"}
         for name, text in given.items():
             target = pointer(text, name)
             key = self.key(inner, name)
             if target is None:
                 self._usage.mention(key, writes=True)
+                self._usage.scripted.add(key)
             else:
                 self._usage.join(self.key(here, target), key)
         for port in self._documents.declarations.subtrees.get(inner, ()):
@@ -165,14 +179,16 @@ class _Walk:
                 if isinstance(part, Name) and "." not in part.name:
                     self._usage.mention(self.key(here, part.name))
             if isinstance(statement, Assignment) and "." not in statement.target.name:
-                self._usage.mention(self.key(here, statement.target.name), writes=True)
+                creates = statement.operator == ":="
+                self._usage.mention(self.key(here, statement.target.name), writes=creates)
+                self._usage.scripted.add(self.key(here, statement.target.name))
 
     def _node(self, here: str, element: Element) -> None:
         node_id = id_of(element)
         leaf = self._documents.declarations.leaves.get(node_id)
         if leaf is not None:
             self._declared(here, element, leaf)
-        elif node_id in SCRIPTED or node_id in built_in_models():
+        elif node_id in built_in_models() and not is_users(element, node_id):
             self._built_in(here, element, node_id)
         elif node_id and node_id not in self._documents.trees:
             self._usage.nodes.setdefault(node_id, []).append(element)
@@ -196,6 +212,7 @@ class _Walk:
             target = inner if inner is not None else text.strip()
             if name == WRITTEN.get(node_id) or (node_id in LOOP_ITEMS and name == "value"):
                 if target.isidentifier() or target.startswith("@"):
+                    self._usage.scripted.add(self.key(here, target))
                     self._usage.mention(self.key(here, target), writes=True, kind=LOOP_ITEMS.get(node_id))
             elif (inner is not None or name == "entry") and name not in SCRIPTS and "." not in target:
                 self._usage.mention(self.key(here, target))
