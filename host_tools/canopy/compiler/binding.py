@@ -19,6 +19,7 @@ from canopy.compiler.script.values import Const, Double, Num, Value
 from canopy.compiler.script_bodies import Bodies, entry_value
 from canopy.compiler.tree import Node, Script, Tree
 from canopy.escape.c import mark_c
+from canopy.tree.lists import items_of
 
 _Item = TypeVar("_Item")
 
@@ -73,6 +74,10 @@ class _Binder:
         bodies = Bodies(self._bus, self._texts, self._floats, {id(node): i for i, node in enumerate(self._nodes)})
         self._each(scripts, lambda script: self._write(script, bodies))
         self._texts_of_leaves()
+        bodies.all_texts_are_known = True
+        self._each(
+            (script for script in scripts if script.role == "switch"), lambda script: self._write(script, bodies)
+        )
         for node in self._nodes:
             if node.leaf is not None and node.bound:
                 bindings.ports[id(node)] = self._ports(ports, node, bindings)
@@ -102,9 +107,14 @@ class _Binder:
             raise script_error(script, error) from error
 
     def _texts_of_leaves(self) -> None:
+        """Texts that no script has: those that leaves write, and those that entries begin with."""
         for node in self._nodes:
             if node.leaf is not None and writes_texts(node.leaf):
                 for text in node.leaf.texts:
+                    self._texts.index(text)
+        for entry in self._tree.board.entries:
+            if entry.initial is not None and entry.type.holds_texts and not entry.is_constant:
+                for text in [entry.initial] if entry.type == TEXT else items_of(entry.initial):
                     self._texts.index(text)
 
     def _uses_text(self) -> bool:
@@ -120,7 +130,7 @@ class _Binder:
             self._parsed[id(script)] = parse(script.text)
         except ScriptError as error:
             raise script_error(script, error) from error
-        for statement in self._parsed[id(script)]:
+        for statement in (part for whole in self._parsed[id(script)] for part in parts(whole)):
             if isinstance(statement, Assignment) and "." not in statement.target.name:
                 place = script.place(statement.index)
                 target = script.scope.resolve(statement.target.name, place)

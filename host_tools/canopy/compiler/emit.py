@@ -44,6 +44,7 @@ from canopy.compiler.limits import FRAMES, whole
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType
 from canopy.compiler.row_c import place_constant, row_fields
+from canopy.compiler.script.arithmetic import RANK
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
@@ -222,6 +223,14 @@ def _queues(table: Table) -> list[PortType]:
     return sorted({kind for kind in kinds if kind.capacity}, key=lambda kind: kind.c)
 
 
+def _ranks(table: Table) -> list[int]:
+    """The place of each text in the order of all; none where no script asks for it."""
+    if not any(f"{RANK}(" in line for script in table.tree.scripts for line in script.body):
+        return []
+    order = sorted(table.bindings.texts, key=str.encode)
+    return [order.index(text) for text in table.bindings.texts]
+
+
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
     return f"{os.path.basename(place.file)}:{place.line}"
@@ -288,6 +297,7 @@ def render(application: Application) -> dict[str, bytes]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "ranks": _ranks(application.table),
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
         "has_values": any(p.type == VALUE for use in application.table.users for p in use.leaf.ports),

@@ -10,7 +10,7 @@ from canopy.compiler.port_types import TEXT, literal
 from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess
 from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
-from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
+from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value, boolean
 from canopy.compiler.tree import Script
 from canopy.escape.c import emits_c
 from canopy.tree.lists import items_of, queue_literal
@@ -27,6 +27,11 @@ def _cases(script: Script) -> int:
     return sum(name.startswith("case_") for name in script.element.attributes)
 
 
+def _is_number(text: str, number: Const) -> bool:
+    value = guess(text)
+    return isinstance(value, Const) and not value.is_bool and not number.is_bool and value.value == number.value
+
+
 class Bodies:
     """Compiles scripts. `indices`: the place of each node (by its id()) in the node table."""
 
@@ -35,6 +40,7 @@ class Bodies:
         self._texts = texts
         self._floats = floats
         self._indices = indices
+        self.all_texts_are_known = False
 
     def body(self, script: Script, statements: tuple[Expression, ...]) -> tuple[str, ...]:
         """The lines of the function, without its head."""
@@ -74,6 +80,7 @@ class Bodies:
             lines += compiler.statement(last)
             last = last.target
         truth = compiler.truth(last)
+        lines += compiler.first()
         return [*lines, f"return {int(truth.value)};" if isinstance(truth, Const) else f"return {stripped(truth.c)};"]
 
     def _value(self, compiler: Compiler, script: Script, text: str, own_name: str) -> Value:
@@ -89,13 +96,22 @@ class Bodies:
             case = self._value(compiler, script, text, attribute)
             if isinstance(value, TextVar) or (isinstance(value, Num) and value.choices and isinstance(case, TextConst)):
                 case = TextConst(text) if pointer(text, attribute) is None else case
-            answer = compiler.compare_values("==", value, case)
+            answer = self._matches(compiler, value, case)
             if isinstance(answer, Const):
                 if answer.value:
                     return [*lines, f"return {place};"]
                 continue
             lines += [f"if {answer.c if answer.c.startswith('(') else f'({answer.c})'} {{", f"    return {place};", "}"]
         return [*lines, f"return {_cases(script)};"]
+
+    def _matches(self, compiler: Compiler, value: Value, case: Value) -> Num | Const:
+        """Equal; of texts also those that are the same number, as in BehaviorTree.CPP: 5 and 5.0."""
+        answer = compiler.compare_values("==", value, case)
+        number = guess(case.text) if isinstance(case, TextConst) else None
+        if not isinstance(value, TextVar) or not isinstance(number, Const) or not self.all_texts_are_known:
+            return answer
+        places = [place for place, text in enumerate(self._texts.all) if _is_number(text, number)]
+        return boolean(f"({' || '.join(f'{value.c} == {place}u' for place in places)})") if places else answer
 
     def _take(self, compiler: Compiler, script: Script) -> list[str]:
         assert isinstance(script.target, Entry)

@@ -20,7 +20,7 @@ from canopy.compiler.port_types import Options
 from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Context, attributes_node
 from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
-from canopy.tree.built_in import CANOPY_ONLY, is_users
+from canopy.tree.built_in import CANOPY_ONLY, built_in_models, foreign_attribute, is_users
 from canopy.tree.node_id import id_of
 from canopy.tree.parameters import read_parameter
 from canopy.tree.ports import bind_port, dotted_names
@@ -243,8 +243,13 @@ class _Builder:
         if node_id in self._models.leaves:  # first: the user's node may have the name of one that only Canopy has
             node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
         elif is_users(element, node_id):
-            self._unknown.add(node_id, element.place, ())
-            return stand_in(element)
+            wrong = foreign_attribute(element, node_id) or ""
+            known = [port.name for port in built_in_models()[node_id][1]]
+            raise CompileError(
+                element.attribute_place(wrong),
+                f"<{node_id}> has no attribute '{wrong}'",
+                f"{nearest(wrong, known)}; if it is a node of your own, canopy model {self._sources[0]} declares it",
+            )
         elif node_id in SCRIPTED:
             node = SCRIPTED[node_id](self.context, element, instance.scope, node_id)
             self._check_plain(element)

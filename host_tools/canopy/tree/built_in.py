@@ -83,18 +83,21 @@ def is_built_in(element: Element, ours: tuple[str, ...]) -> bool:
     return True
 
 
-def is_users(element: Element, name: str) -> bool:
-    """Is this node, which no file declares, the user's own, though Canopy has one of that name?
+def foreign_attribute(element: Element, name: str) -> str | None:
+    """The first attribute that our node of this name does not have, if BehaviorTree.CPP has no such node.
 
-    BehaviorTree.CPP does not have it, and the node has attributes that ours does not have.
+    Then the node is the user's own, or misspelt.
     """
     if name not in CANOPY_ONLY:
-        return False
+        return None
     ours = {port.name for port in built_in_models()[name][1]}
-    return any(
-        attribute not in ours and attribute not in ("ID", "name") and not attribute.startswith("_")
-        for attribute in element.attributes
-    )
+    others = (each for each in element.attributes if each not in ours and each not in ("ID", "name"))
+    return next((each for each in others if not each.startswith("_")), None)
+
+
+def is_users(element: Element, name: str) -> bool:
+    """Is this node, which no file declares, the user's own, though Canopy has one of that name?"""
+    return foreign_attribute(element, name) is not None
 
 
 def built_in_xml() -> str:

@@ -42,8 +42,8 @@ class Use:
 class Usage:
     """What was found.
 
-    `scripted`: what scripts and literals give a type; `first`: the order of the first mention of an entry by anything but
-    an undeclared node; `mains`: the trees that can be main ones.
+    `scripted`: what scripts and literals give a type; `first`: the order of the first mention of an entry by anything
+    but an undeclared node; `mains`: the trees that can be main ones.
     """
 
     uses: list[Use] = field(default_factory=list)
@@ -174,14 +174,12 @@ class _Walk:
             statements = parse(text)
         except ScriptError:
             return
-        for statement in statements:
-            for part in parts(statement):
-                if isinstance(part, Name) and "." not in part.name:
-                    self._usage.mention(self.key(here, part.name))
-            if isinstance(statement, Assignment) and "." not in statement.target.name:
-                creates = statement.operator == ":="
-                self._usage.mention(self.key(here, statement.target.name), writes=creates)
-                self._usage.scripted.add(self.key(here, statement.target.name))
+        for part in (part for statement in statements for part in parts(statement)):
+            if isinstance(part, Name) and "." not in part.name:
+                self._usage.mention(self.key(here, part.name))
+            if isinstance(part, Assignment) and "." not in part.target.name:
+                self._usage.mention(self.key(here, part.target.name), writes=part.operator == ":=")
+                self._usage.scripted.add(self.key(here, part.target.name))
 
     def _node(self, here: str, element: Element) -> None:
         node_id = id_of(element)

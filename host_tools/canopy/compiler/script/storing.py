@@ -32,6 +32,8 @@ class Storing:
         if kind.kind == "text":
             if isinstance(value, (TextConst, TextVar)):
                 return self._arithmetic.text(value)
+            if isinstance(value, Const) and value.value.denominator == 1 and not value.is_bool:
+                return self._arithmetic.text(TextConst(plain(value.value)))  # a text port reads a number as text
             raise ScriptError(index, f"{describe(value)} cannot be stored as a text", "write it in '…'")
         if isinstance(value, (TextConst, TextVar)) or kind.kind == "user":
             raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
