@@ -3,10 +3,10 @@
 
     python tests/corpus/measure.py CHECKOUTS [--draw 50 --seed 1] [--vendor OWNER]
 
-Each folder in CHECKOUTS is one repository; a file COMMIT in it, or its git, says which commit. Every file with a root of
-format 4 and a <BehaviorTree> is compiled four times at most: alone; with --search over its repository; with one model
-that `canopy model` wrote for it; all with floating point, unset ports and a header of C types allowed. A file without a
-main tree counts when each of its trees that is no part of another one compiles.
+Each folder in CHECKOUTS is one repository; a file COMMIT in it, or its git, says which commit. Every file with a root
+of format 4 and a <BehaviorTree> is compiled three times at most: alone; with --search over its repository; with one
+model that `canopy model` wrote for it; all with floating point, unset ports and a header of C types allowed. A file
+without a main tree counts when each of its trees that is no part of another one compiles.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from canopy.compiler.emit import load_application
 from canopy.compiler.errors import CombinedError, CompileError
 from canopy.compiler.port_types import ANY_TYPE, Options
 from canopy.compiler.tree_reader import built_in_names
-from canopy.compiler.xml_reader import parse_xml
 from canopy.tree.guess import guess_models
 from canopy.tree.model_file import model_text
 from canopy.tree.search import complete
@@ -105,9 +104,7 @@ def _compile(path: Path, options: Options) -> None:
         own = [name for name, tree in documents.trees.items() if tree.place.file == str(path)]
         mains = list(roots(own or list(documents.trees), documents.trees))
     for main in mains:
-        load_application(
-            "corpus", path, DBC, "Controller", 50, 500_000, options=replace(options, main_tree=main)
-        )
+        load_application("corpus", path, DBC, "Controller", 50, 500_000, options=replace(options, main_tree=main))
 
 
 def _model(path: Path, options: Options, into: Path) -> Path:
@@ -132,7 +129,7 @@ def measure(repository: Path, path: Path, scratch: Path) -> Result:
             errors = error.errors if isinstance(error, CombinedError) else (error,)
             result.classes = Counter({name_of(one): 1 for one in errors})
             result.message = str(error)
-        except Exception as error:  # noqa: BLE001  # any other one is a fault, and is to be counted as such
+        except Exception as error:  # any other one is a fault, and is to be counted as such
             result.classes = Counter({FAULT: 1})
             result.message = f"{path}: {type(error).__name__}: {error}"
         else:

@@ -86,7 +86,8 @@ ROWS = (
 def computed(tmp_path_factory: pytest.TempPathFactory) -> list[float | str]:
     """What each row's script gives here: one tree each, in one program."""
     folder = tmp_path_factory.mktemp("rows")
-    trees = "".join(f'<BehaviorTree ID="T{n}"><Script code={quoteattr(row.script)}/></BehaviorTree>' for n, row in ROWS_)
+    scripts = [f"<Script code={quoteattr(row.script)}/>" for row in ROWS]
+    trees = "".join(f'<BehaviorTree ID="T{n}">{script}</BehaviorTree>' for n, script in enumerate(scripts))
     calls = "".join(f'<SubTree ID="T{n}" name="t{n}"/>' for n, _ in ROWS_)
     main_tree = f'<BehaviorTree ID="Main"><Sequence>{calls}</Sequence></BehaviorTree>'
     root = f'<root BTCPP_format="4" main_tree_to_execute="Main">{main_tree}{trees}</root>'

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from canopy.check.bus_facts import BusFacts
@@ -26,7 +26,7 @@ from canopy.compiler.xml_reader import Element
 
 _ALLOW = re.compile(r"canopy:allow\s+([\w-]+(?:\s*,\s*[\w-]+)*)")
 _BITRATE = 500_000
-OF_THE_WHOLE = ("root-can-fail", "condition-writes", "unused-port", "unused-tree")
+OF_THE_WHOLE = ("root-can-fail", "condition-writes", "unused-port", "unused-tree", "refused-name")
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
     """
     wanted = list(rules)
     report = Report()
-    types = types or Options()
+    types = replace(types or Options(), undeclared=True)
     try:
         facts = _load(path, bus, types)
     except CompileError as error:

@@ -30,6 +30,8 @@ class Documents:
     trees: dict[str, Element] = field(default_factory=dict)
     main: str = ""
     top: Element | None = None
+    problems: int = 0
+    """How many errors were left out, where the trees are only drawn."""
     declarations: Declarations = field(default_factory=Declarations)
     foreign: Foreign = field(default_factory=Foreign)
     library: Library = field(default_factory=Library)
@@ -59,19 +61,38 @@ class _Reader:
                 waiting.pop()
                 chain.popitem()
             elif element.tag == "include":
-                path = self._included(element, file)
+                try:
+                    path = self._included(element, file)
+                except CompileError as error:
+                    self._wrong(error)
+                    continue
                 target = path.resolve()
+                if target in chain and self._options.draw:
+                    continue
                 if target in chain:
                     names = " -> ".join(open_file.name for open_file in (*chain, target))
                     raise CompileError(element.place, f"files include each other in a loop: {names}")
                 if target not in known:
-                    inner = self._read_root(path, element)
-                    waiting.append((iter(inner.children), path))
                     known.add(target)
+                    try:
+                        inner = self._read_root(path, element)
+                    except CompileError as error:
+                        self._wrong(error)
+                        continue
+                    waiting.append((iter(inner.children), path))
                     chain[target] = None
             else:
-                self._take(element)
+                try:
+                    self._take(element)
+                except CompileError as error:
+                    self._wrong(error)
         return top
+
+    def _wrong(self, error: CompileError) -> None:
+        """Raises it; where trees are only drawn, counts it."""
+        if not self._options.draw:
+            raise error
+        self.documents.problems += 1
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
         try:
@@ -84,13 +105,15 @@ class _Reader:
             raise CompileError(place, message, "paths are relative to this file") from error
         self.documents.files.append(path)
         root = parse_xml(data, str(path))
-        if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
+        is_tree_file = root.tag == "root" and (self._options.draw or root.attributes.get("BTCPP_format") == "4")
+        if not is_tree_file:
             raise CompileError(
                 root.place,
                 'the outer element must be <root BTCPP_format="4">',
-                "a file without it may be one of BehaviorTree.CPP 3, which Groot2 converts",
+                "a file without it may be one of BehaviorTree.CPP 3: canopy fmt --to-4 converts it",
             )
-        root.only(self.documents.foreign, "BTCPP_format", "main_tree_to_execute", "project_name")
+        if not self._options.draw:
+            root.only(self.documents.foreign, "BTCPP_format", "main_tree_to_execute", "project_name")
         return root
 
     def _included(self, element: Element, file: Path) -> Path:
@@ -121,7 +144,7 @@ class _Reader:
             if tree_id in self.documents.trees:
                 first = f"the other one: {self.documents.trees[tree_id].place}"
                 raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
-            if len(element.children) != 1:
+            if len(element.children) != 1 and not (self._options.draw and element.children):
                 raise CompileError(
                     element.place,
                     f"<BehaviorTree ID='{tree_id}'> needs exactly 1 node, and has {len(element.children)}",
@@ -135,7 +158,7 @@ class _Reader:
             )
 
 
-def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) -> str:
+def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None, draw: bool) -> str:
     if asked is not None:
         if asked not in trees:
             raise CompileError(
@@ -143,7 +166,7 @@ def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) ->
             )
         return asked
     wanted = root.attributes.get("main_tree_to_execute")
-    if wanted is not None:
+    if wanted is not None and (wanted in trees or not draw):
         if wanted not in trees:
             raise CompileError(
                 root.attribute_place("main_tree_to_execute"),
@@ -155,6 +178,8 @@ def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) ->
     for candidates in (own, list(trees)):
         if len(candidates) == 1:
             return candidates[0]
+    if draw:
+        return roots(own or list(trees), trees)[0]
     raise CompileError(root.place, "several trees, and no main_tree_to_execute says which", main_tree_list(own, trees))
 
 
@@ -201,5 +226,5 @@ def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Do
     assert documents.top is not None
     if not documents.trees:
         raise CompileError(Place(documents.top.place.file, 1, 1), "no <BehaviorTree> in this file")
-    documents.main = _choose_tree(documents.top, documents.trees, options.main_tree)
+    documents.main = _choose_tree(documents.top, documents.trees, options.main_tree, options.draw)
     return documents

@@ -116,6 +116,8 @@ class Leaf:
     holds: str = ""
     safeguards: tuple[str, ...] = ()
     problem: UnsupportedTypeError | None = field(default=None, compare=False)
+    is_guessed: bool = False
+    """No file declares it: it is what its use lets guess."""
 
     @cached_property
     def c_name(self) -> str:

@@ -102,4 +102,6 @@ class Tree:
     unused: dict[str, Element] = field(default_factory=dict)
     problems: int = 0
     """How many errors were left out, where a tree is only drawn."""
+    others: tuple[str, ...] = ()
+    """The other trees that can be the main one, where a tree is only drawn and the file does not say."""
     foreign: Foreign = field(default_factory=Foreign)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
-from canopy.compiler.documents import PLAIN_ATTRIBUTES, Documents, read_documents
+from canopy.compiler.documents import PLAIN_ATTRIBUTES, Documents, read_documents, roots
 from canopy.compiler.errors import CompileError, Errors, nearest
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.node_types import NodeType, node_types
@@ -21,6 +21,7 @@ from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Co
 from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
 from canopy.tree.built_in import CANOPY_ONLY, built_in_models, foreign_attribute, is_users
+from canopy.tree.model_file import declare_guessed
 from canopy.tree.node_id import id_of
 from canopy.tree.parameters import read_parameter
 from canopy.tree.ports import bind_port, dotted_names
@@ -332,14 +333,25 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
     """
     options = options or Options()
     documents = read_documents(path, options, built_in_names())
+    if options.undeclared:
+        declare_guessed(documents, options, built_in_names())
     tree = _expand(path, documents, _Builder(documents, options), documents.main)
     own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
-    return replace(tree, unused={name: element for name, element in own.items() if name not in tree.used})
+    first = roots(list(own), documents.trees) if options.draw and options.main_tree is None else []
+    if documents.top is not None and documents.top.attributes.get("main_tree_to_execute") in documents.trees:
+        first = []
+    return replace(
+        tree,
+        others=tuple(name for name in first if name != tree.id),
+        unused={name: element for name, element in own.items() if name not in tree.used},
+    )
 
 
 def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tuple[str, Tree | CompileError]]:
     """The file's trees that are no part of its main tree: each that is no part of another one, or why it cannot be."""
     documents = read_documents(path, options, built_in_names())
+    if options.undeclared:
+        declare_guessed(documents, options, built_in_names())
     inner = {ref for element in tree.unused.values() for ref in _subtrees(element)}
     seen: set[str] = set()
     nodes = 0
@@ -382,6 +394,6 @@ def _expand(path: Path, documents: Documents, builder: _Builder, tree_id: str) -
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
         used=frozenset(builder.used),
-        problems=len(builder.errors),
+        problems=len(builder.errors) + documents.problems,
         foreign=documents.foreign,
     )

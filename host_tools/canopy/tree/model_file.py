@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
-from canopy.compiler.port_types import PortType
+from canopy.compiler.documents import Documents
+from canopy.compiler.errors import CompileError
+from canopy.compiler.leaf_model import Declarations, read_model
+from canopy.compiler.port_types import Options, PortType
+from canopy.compiler.xml_reader import parse_xml
 from canopy.escape import markup
-from canopy.tree.guess import Guess, GuessedNode, GuessedPort, type_name
+from canopy.tree.guess import Guess, GuessedNode, GuessedPort, guess_models, type_name
+from canopy.tree.search import complete
 
 MARK = "CONFIRM"
+GUESSED = "(guessed)"
 _ZERO = {"bool": "false", "int": "0", "fixed": "0", "float": "0.0", "duration": "0", "text": ""}
 
 
@@ -50,3 +58,23 @@ def model_text(guess: Guess) -> str:
             )
         lines.append("    </SubTree>")
     return "\n".join([*lines, "  </TreeNodesModel>", "</root>", ""])
+
+
+def declare_guessed(documents: Documents, options: Options, built_in: frozenset[str]) -> None:
+    """Declares what no file does, as guessed, for tools that look at trees before they compile."""
+    with contextlib.suppress(CompileError):  # what is wrong is said where it is used
+        complete(documents, built_in)
+    guess = guess_models([documents])
+    if not guess.nodes and not guess.inputs:
+        return
+    found = Declarations()
+    options = replace(options, floats=True, any_type=True)
+    root = parse_xml(model_text(guess).encode(), GUESSED)
+    read_model(root.children[0], found, options, built_in)
+    for name, leaf in found.leaves.items():
+        place = guess.nodes[name].elements[0].place
+        documents.declarations.leaves[name] = replace(leaf, is_guessed=True, place=place)
+    for tree_id, ports in found.subtrees.items():
+        declared = documents.declarations.subtrees.get(tree_id, ())
+        names = {port.name for port in declared}
+        documents.declarations.subtrees[tree_id] = (*declared, *(port for port in ports if port.name not in names))
