@@ -14,6 +14,7 @@ from xml.parsers import expat
 
 from canopy.compiler.errors import CompileError, Place
 from canopy.files import FileError, read_bytes
+from canopy.tree import raw_markup
 from canopy.tree.foreign import Foreign
 
 MAX_DEPTH = 65_534
@@ -90,6 +91,24 @@ def unreadable_encoding(file: str, error: Exception) -> CompileError:
     )
 
 
+def malformed(data: bytes, file: str, error: expat.ExpatError) -> CompileError:
+    """For what expat raises; a raw & or < of a script is named, with what to write."""
+    for offset, raw in raw_markup.find(data):
+        line = data.count(b"\n", 0, offset) + 1
+        start = data.rfind(b"\n", 0, offset) + 1
+        if line > error.lineno:
+            break
+        written = raw_markup.WRITTEN[raw].decode()
+        return CompileError(
+            Place(file, line, len(data[start:offset].decode("utf-8", errors="replace")) + 1),
+            f"not well-formed XML: a raw '{raw.decode()}'",
+            f"in XML it is written {written}; canopy fmt --repair FILE mends all of them",
+        )
+    return CompileError(
+        Place(file, error.lineno, error.offset + 1), f"not well-formed XML: {expat.ErrorString(error.code)}"
+    )
+
+
 class _Builder:
     def __init__(self, file: str) -> None:
         self._file = file
@@ -134,8 +153,7 @@ class _Builder:
         try:
             self._parser.Parse(data, True)
         except expat.ExpatError as error:
-            place = Place(self._file, error.lineno, error.offset + 1)
-            raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+            raise malformed(data, self._file, error) from error
         except (LookupError, ValueError) as error:
             raise unreadable_encoding(self._file, error) from error
         assert self._root is not None  # expat refuses a document without an element
