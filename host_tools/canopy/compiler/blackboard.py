@@ -91,6 +91,8 @@ class Blackboard:
         self.entries: list[Entry] = []
         self.dotted: set[str] = set()
         """Names with a dot that are entries all the same: a node writes them."""
+        self.enums: dict[str, int] = {}
+        """What names of enums' values mean in scripts."""
         self.main = Scope(self, "")
         self._c_names: dict[str, int] = {}  # with the last number that was put behind it
 

@@ -105,7 +105,9 @@ class _Reader:
             raise CompileError(place, message, "paths are relative to this file") from error
         self.documents.files.append(path)
         root = parse_xml(data, str(path))
-        is_tree_file = root.tag == "root" and (self._options.draw or root.attributes.get("BTCPP_format") == "4")
+        # An included file that does not say its format has that of the file that includes it.
+        version = root.attributes.get("BTCPP_format", "4" if included_by is not None else "")
+        is_tree_file = root.tag == "root" and (self._options.draw or version == "4")
         if not is_tree_file:
             raise CompileError(
                 root.place,

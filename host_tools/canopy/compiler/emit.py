@@ -52,6 +52,7 @@ from canopy.compiler.tree_reader import read_tree
 from canopy.escape import c_templates
 from canopy.escape.c import header, string
 from canopy.escape.json_text import dumps
+from canopy.tree.enums import constants
 from canopy.tree.generic import VALUE
 
 MODEL_FORMAT = 1
@@ -297,6 +298,7 @@ def render(application: Application) -> dict[str, bytes]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "enums": constants(application.name, application.table.tree.enums),
         "ranks": _ranks(application.table),
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),

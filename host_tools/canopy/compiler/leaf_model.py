@@ -13,7 +13,8 @@ Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction 
 FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state), `texts` (what the node may
 write to its output ports of texts, separated by semicolons: texts are constants).
 
-<Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
+<Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree, <Enum> a type
+(canopy.tree.enums).
 
 Metadata that only `canopy check` and `canopy fmt --simplify` use (docs/lint.md, docs/tools.md), and that changes no
 generated code: `returns` (the statuses that the leaf can return, if fewer than its kind allows), `undoes` and
@@ -27,7 +28,7 @@ Metadata of other tools is left alone (canopy.tree.foreign).
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -37,6 +38,7 @@ from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, is_optional, read_type
 from canopy.compiler.xml_reader import Element
 from canopy.tree.built_in import is_built_in
+from canopy.tree.enums import add_enum
 from canopy.tree.foreign import Foreign
 
 METADATA = (
@@ -67,6 +69,7 @@ PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
     "bidirectional_port": "inout",  # the name in older models
 }
 MODEL_TAGS = ("Action", "Condition", "Control", "Decorator", "SubTree")
+ENUM_TAG = "Enum"
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,7 @@ class Declarations:
     c_names: dict[str, Leaf] = field(default_factory=dict)
     """The same leaves, by their C names."""
     subtrees: dict[str, tuple[Port, ...]] = field(default_factory=dict)
+    enums: dict[str, PortType] = field(default_factory=dict)
 
 
 @dataclass
@@ -308,9 +312,17 @@ def read_model(
     foreign = foreign or Foreign(options.foreign)
     seen: set[str] = set()
     for element in model.children:
+        if element.tag == ENUM_TAG:
+            add_enum(element, into.enums, foreign)
+    options = replace(options, enums=into.enums)
+    for element in model.children:
+        if element.tag == ENUM_TAG:
+            continue
         if element.tag not in MODEL_TAGS:
             raise CompileError(
-                element.place, f"<{element.tag}> in <TreeNodesModel> is not supported", nearest(element.tag, MODEL_TAGS)
+                element.place,
+                f"<{element.tag}> in <TreeNodesModel> is not supported",
+                nearest(element.tag, (*MODEL_TAGS, ENUM_TAG)),
             )
         node_id = element.attributes.get("ID", "")
         if not node_id:

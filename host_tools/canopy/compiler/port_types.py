@@ -135,6 +135,7 @@ class Options:
     unset_ports: bool = False  # input ports may have neither a value nor a default: 0, false or NULL
     main_tree: str | None = None  # instead of the file's main_tree_to_execute
     any_type: bool = False  # types for which there is nothing in C are accepted
+    enums: dict[str, PortType] = field(default_factory=dict)
     search: tuple[Path, ...] = ()  # folders, projects and files that trees and models are looked for in
     draw: bool = False  # what is wrong is drawn as far as it can be
     undeclared: bool = False  # nodes that nobody declared are taken as what they can be
@@ -213,6 +214,9 @@ def read_type(name: str, where: str, place: Place, options: Options) -> PortType
     normal = mapped.get(_normal(name), _normal(name))
     normal = without_optional(normal)
     normal = mapped.get(normal, normal)
+    enum = options.enums.get(normal) or options.enums.get(normal.rpartition("::")[2])
+    if enum is not None:
+        return enum
     known = PORT_TYPES.get(normal) or PORT_TYPES.get(normal.removeprefix("std::"))
     if known is not None:
         if known.kind == "float" and not options.floats:
@@ -287,7 +291,7 @@ def literal(text: str, kind: PortType, where: str, place: Place) -> str:
     named = dict(kind.names)
     limits = {"max": kind.high, "min": kind.low, "lowest": kind.low, "inf": kind.high + 1, "-inf": kind.low - 1}
     limit = limit_of(text)
-    if kind.names and text not in named and not text.isdecimal():
+    if kind.names and text not in named and not text.lstrip("-").isdecimal():
         raise CompileError(place, f"{where}: '{text}' is no value of {kind}", nearest(text, named))
     try:
         value = named[text] if text in named else limits[limit] if limit in limits else _whole(text)

@@ -100,6 +100,7 @@ class Tree:
     scripts: tuple[Script, ...] = ()
     used: frozenset[str] = frozenset()
     unused: dict[str, Element] = field(default_factory=dict)
+    enums: dict[str, PortType] = field(default_factory=dict)
     problems: int = 0
     """How many errors were left out, where a tree is only drawn."""
     others: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
@@ -21,6 +21,8 @@ from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Co
 from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
 from canopy.tree.built_in import CANOPY_ONLY, built_in_models, foreign_attribute, is_users
+from canopy.tree.enums import names_of
+from canopy.tree.instance import Instance
 from canopy.tree.model_file import declare_guessed
 from canopy.tree.node_id import id_of
 from canopy.tree.parameters import read_parameter
@@ -59,21 +61,6 @@ def built_in_names() -> frozenset[str]:
     return frozenset((*built_in_types(), *SCRIPTED, *NOT_SUPPORTED, "SubTree", *EXPLICIT))
 
 
-@dataclass
-class _Instance:
-    """One instance of a tree: its scope, its path for the host tools, and the tree IDs that led to it."""
-
-    scope: Scope
-    path: str
-    chain: tuple[str, ...]
-    names: dict[str, int] = field(default_factory=dict)
-
-    def unique(self, name: str) -> str:
-        """`name`, with `::2` and so on from the second use in this instance on."""
-        self.names[name] = self.names.get(name, 0) + 1
-        return name if self.names[name] == 1 else f"{name}::{self.names[name]}"
-
-
 class _Builder:
     def __init__(self, documents: Documents, options: Options) -> None:
         self._documents = documents
@@ -95,7 +82,8 @@ class _Builder:
         with contextlib.suppress(CompileError):  # what is wrong is said where it is used
             complete(self._documents, built_in_names(), tree_id)
         self.context.board.dotted = dotted_names(self._documents)
-        main = _Instance(self.context.board.main, tree_id, (tree_id,))
+        self.context.board.enums = names_of(self._models.enums)
+        main = Instance(self.context.board.main, tree_id, (tree_id,))
         self.used.add(tree_id)
         self._main_ports(main.scope, tree_id)
         root, inner, element, instance = self._expand(self._trees[tree_id].children[0], main)
@@ -145,7 +133,7 @@ class _Builder:
             self.errors.raise_any()
         return node
 
-    def _expand(self, element: Element, instance: _Instance) -> tuple[Node, Node, Element, _Instance]:
+    def _expand(self, element: Element, instance: Instance) -> tuple[Node, Node, Element, Instance]:
         """The node of an element, below the nodes of its attributes; for a SubTree, the root of its tree.
 
         Gives the outermost node, and the innermost one with its element and instance.
@@ -155,7 +143,7 @@ class _Builder:
         while True:
             attributes: Node | None = None
             node: Node | None = None
-            inner: _Instance | None = None
+            inner: Instance | None = None
             try:
                 attributes = attributes_node(self.context, element, instance.scope)
                 if element.tag == "SubTree":
@@ -180,7 +168,7 @@ class _Builder:
             instance = inner
             element = self._trees[instance.chain[-1]].children[0]
 
-    def _enter(self, element: Element, outer: _Instance) -> _Instance:
+    def _enter(self, element: Element, outer: Instance) -> Instance:
         """A new instance of the tree that a <SubTree> names."""
         tree_id = element.attributes.get("ID", "")
         if tree_id not in self._trees and not self._library.add_tree(tree_id, element, self._documents):
@@ -209,7 +197,7 @@ class _Builder:
             )
         scope = Scope(self.context.board, path, outer.scope, autoremap=autoremap.lower() in ("true", "1"))
         self._connect(element, scope, tree_id)
-        return _Instance(scope, f"{outer.path}/{name}", (*outer.chain, tree_id))
+        return Instance(scope, f"{outer.path}/{name}", (*outer.chain, tree_id))
 
     def _connect(self, element: Element, scope: Scope, tree_id: str) -> None:
         plain = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, "ID", "_autoremap"}
@@ -237,7 +225,7 @@ class _Builder:
             if isinstance(target, Entry):
                 target.connect(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
 
-    def _make(self, element: Element, instance: _Instance) -> Node:
+    def _make(self, element: Element, instance: Instance) -> Node:
         node_id = id_of(element)
         if node_id not in self._known:
             self._library.add_model(node_id, element, self._documents)
@@ -394,6 +382,7 @@ def _expand(path: Path, documents: Documents, builder: _Builder, tree_id: str) -
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
         used=frozenset(builder.used),
+        enums=documents.declarations.enums,
         problems=len(builder.errors) + documents.problems,
         foreign=documents.foreign,
     )

@@ -34,12 +34,15 @@ class Element:
     _values: dict[bytes, tuple[int, int]] | None = field(default=None, repr=False)
     _characters: dict[str, list[int]] = field(default_factory=dict, repr=False)
     """Where each character of an attribute begins: scripts ask for many."""
+    _begins: dict[str, Place] = field(default_factory=dict, repr=False)
 
     def attribute_place(self, name: str, index: int = 0) -> Place:
         """The place of character `index` of an attribute's value; the tag's place when the value cannot be found.
 
         Expat gives no places of attributes, so the tag is read again; `&lt;` and the like are one character.
         """
+        if not index and name in self._begins:
+            return self._begins[name]
         if self._values is None:
             self._values = self._read_again()
         start, end = self._values.get(name.encode(), (0, 0))
@@ -50,7 +53,10 @@ class Element:
                 self._characters[name] = [match.start() for match in _CHARACTER.finditer(self.source, start, end)]
             starts = self._characters[name]
             start = starts[index] if index < len(starts) else end
-        return self._place_of(start)
+        place = self._place_of(start)
+        if not index:
+            self._begins[name] = place
+        return place
 
     def only(self, foreign: Foreign, *known: str) -> None:
         """Looks at attributes that are not known: those of other namespaces are nobody's, others are `foreign`.

@@ -212,7 +212,11 @@ class _Guesser:
     def _inputs(self) -> None:
         """Entries that still nobody writes, and those that only ports without a type are connected to."""
         for root in sorted({*self._entries, *self._first}):
-            if root in self._written and (root in self._types or root in self._entries or root in self._scripted):
+            given = root in self._written and (root in self._types or root in self._entries or root in self._scripted)
+            names = self._keys.get(root, [root])
+            # What one main tree writes to @name, another one may miss.
+            shared = any(key[1] == "@" and len(self._usage.mains.get(key[0], ())) > 1 for key in names)
+            if given and not shared:
                 continue
             for tree_id, name in self._main_names(root):
                 self.guess.inputs.setdefault(tree_id, {}).setdefault(name, self._types.get(root, INT32))

@@ -205,6 +205,7 @@ class Library:
         if not candidates:
             return
         found = Declarations()
+        found.enums = documents.declarations.enums
         for element in candidates:
             model = Element("TreeNodesModel", {}, element.place, [element])
             try:

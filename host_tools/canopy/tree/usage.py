@@ -16,6 +16,7 @@ from canopy.compiler.script.syntax import Assignment, Name, ScriptError, parse, 
 from canopy.compiler.scripted import LOOP_ITEMS, POSTCONDITIONS, PRECONDITIONS
 from canopy.compiler.xml_reader import Element
 from canopy.tree.built_in import built_in_models, is_users
+from canopy.tree.enums import names_of
 from canopy.tree.node_id import id_of
 
 Key = tuple[int, str, str]
@@ -109,6 +110,7 @@ class _Walk:
         self._seen: set[str] = set()
         self._remapped: list[tuple[str, str, frozenset[str]]] = []
         self._names: dict[str, set[str]] = {}
+        self._enums = names_of(documents.declarations.enums)
 
     def key(self, tree_id: str, name: str) -> Key:
         """The entry of a name in a tree."""
@@ -175,7 +177,7 @@ class _Walk:
         except ScriptError:
             return
         for part in (part for statement in statements for part in parts(statement)):
-            if isinstance(part, Name) and "." not in part.name:
+            if isinstance(part, Name) and "." not in part.name and part.name not in self._enums:
                 self._usage.mention(self.key(here, part.name))
             if isinstance(part, Assignment) and "." not in part.target.name:
                 self._usage.mention(self.key(here, part.target.name), writes=part.operator == ":=")

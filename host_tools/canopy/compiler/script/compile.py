@@ -185,7 +185,9 @@ class Compiler:
     # Names
 
     def named(self, name: str, index: int) -> Value:
-        """What a name's value is."""
+        """What a name's value is; the values of enums come first, as in BehaviorTree.CPP."""
+        if name in self.scope.board.enums:
+            return Const(Fraction(self.scope.board.enums[name]))
         return self.target_value(self._resolve(name, index), index)
 
     def _resolve(self, name: str, index: int) -> Entry | SignalName:
@@ -197,10 +199,13 @@ class Compiler:
     def entry(self, entry: Entry, index: int) -> Value:
         """An entry's value."""
         if entry.is_constant:
+            if entry.initial in dict(entry.type.names):
+                return Const(Fraction(dict(entry.type.names)[entry.initial or ""]))
             value = guess(entry.initial or "")
             return TextConst(entry.initial or "") if entry.type.kind == "text" else value
         if entry.initial is None and not entry.is_written:
-            raise ScriptError(index, f"nothing writes entry '{entry.name}'", self.scope.help_for(entry.name))
+            hint = f"{self.scope.help_for(entry.name)}; a value of an enum is declared: <Enum> in <TreeNodesModel>"
+            raise ScriptError(index, f"nothing writes entry '{entry.name}'", hint)
         return self.stored(entry, index)
 
     def stored(self, entry: Entry, index: int) -> Value:
@@ -217,7 +222,8 @@ class Compiler:
             return Double(c if kind.c == "double" else f"(double){c}")
         if kind.high > INT64[1]:
             return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1], kind.scale)
-        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool")
+        choices = dict(kind.names)
+        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool", choices=choices)
 
     def message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
         """The message of that name.
@@ -330,6 +336,9 @@ class Compiler:
         return [*first, *lines, *(["} else {", *indented[1]] if no else []), "}"]
 
     def _lines(self, expression: Assignment) -> list[str]:
+        if expression.target.name in self.scope.board.enums:
+            message = f"'{expression.target.name}' is a value of an enum: it cannot be written"
+            raise ScriptError(expression.target.index, message, "give the entry another name")
         target = self._resolve(expression.target.name, expression.target.index)
         if isinstance(target, SignalName):
             return write_signal(self, target.text, expression)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from canopy.compiler.numbers import exact
 
@@ -289,6 +290,7 @@ class _Parser:
         raise ScriptError(token.index, f"a value is expected here, not {what}")
 
 
+@lru_cache(maxsize=100_000)  # conditions of a tree are often the same
 def parse(text: str) -> tuple[Expression, ...]:
     """The statements of a script, at least one.
 
