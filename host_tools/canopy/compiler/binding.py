@@ -141,7 +141,7 @@ class _Binder:
     def _check_existing(self, entry: Entry) -> None:
         mine = self._assigned.get(id(entry), [])
         creating = [a for _, a in mine if a.operator == ":="]
-        others = sum(use.writes for use in entry.uses) - len(mine)
+        others = len(entry.uses) - len(mine)  # a port that is connected to it is enough, as in BehaviorTree.CPP
         if mine and not creating and not others and entry.initial is None:
             script, statement = mine[0]
             message = f"'{statement.operator}' needs an entry that is there, and nothing creates '{entry.name}'"

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.limits import count
@@ -85,6 +87,8 @@ class Bodies:
 
     def _value(self, compiler: Compiler, script: Script, text: str, own_name: str) -> Value:
         name = pointer(text, own_name)
+        if name is None and text in script.scope.board.enums:
+            return Const(Fraction(script.scope.board.enums[text]))
         return guess(text) if name is None else compiler.named(name, 0)
 
     def _switch(self, compiler: Compiler, script: Script) -> list[str]:
