@@ -57,6 +57,8 @@ class Guess:
 
     nodes: dict[str, GuessedNode] = field(default_factory=dict)
     inputs: dict[str, dict[str, PortType]] = field(default_factory=dict)
+    locals: dict[str, dict[str, PortType]] = field(default_factory=dict)
+    """Entries of inner trees that no declared port gives a type."""
 
 
 def literal_type(texts: Iterable[str]) -> PortType:
@@ -211,6 +213,8 @@ class _Guesser:
 
     def _inputs(self) -> None:
         """Entries that still nobody writes, and those that only ports without a type are connected to."""
+        for key, texts in self._usage.literals.items():
+            self._types.setdefault(self._usage.root(key), literal_type(texts))
         for root in sorted({*self._entries, *self._first}):
             given = root in self._written and (root in self._types or root in self._entries or root in self._scripted)
             names = self._keys.get(root, [root])
@@ -218,7 +222,11 @@ class _Guesser:
             shared = any(key[1] == "@" and len(self._usage.mains.get(key[0], ())) > 1 for key in names)
             if given and not shared:
                 continue
-            for tree_id, name in self._main_names(root):
+            mains = self._main_names(root)
+            if not mains and root not in self._types and root[1] != "@":
+                _, tree_id, name = names[0]
+                self.guess.locals.setdefault(tree_id, {}).setdefault(name, INT32)
+            for tree_id, name in mains:
                 self.guess.inputs.setdefault(tree_id, {}).setdefault(name, self._types.get(root, INT32))
 
 

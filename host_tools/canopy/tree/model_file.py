@@ -49,13 +49,14 @@ def model_text(guess: Guess) -> str:
     lines = ['<root BTCPP_format="4">', "  <TreeNodesModel>"]
     for name in sorted(guess.nodes):
         lines += _node(guess.nodes[name])
-    for tree_id, inputs in sorted(guess.inputs.items()):
-        lines.append(f"    <!-- {MARK}: what the program writes before the tree reads it -->")
+    for tree_id in sorted({*guess.inputs, *guess.locals}):
         lines.append(f"    <SubTree ID={quoteattr(tree_id)}>")
-        for name, kind in sorted(inputs.items()):
-            lines.append(
-                f"      <input_port name={quoteattr(name)}{_type(kind)}>{MARK}: nothing writes it</input_port>"
-            )
+        for name, kind in sorted(guess.inputs.get(tree_id, {}).items()):
+            port = f"<input_port name={quoteattr(name)}{_type(kind)}>"
+            lines.append(f"      {port}{MARK}: nothing writes it before the tree reads it</input_port>")
+        for name, kind in sorted(guess.locals.get(tree_id, {}).items()):
+            port = f"<inout_port name={quoteattr(name)}{_type(kind)}>"
+            lines.append(f"      {port}{MARK}: nothing tells its type</inout_port>")
         lines.append("    </SubTree>")
     return "\n".join([*lines, "  </TreeNodesModel>", "</root>", ""])
 
@@ -65,7 +66,7 @@ def declare_guessed(documents: Documents, options: Options, built_in: frozenset[
     with contextlib.suppress(CompileError):  # what is wrong is said where it is used
         complete(documents, built_in)
     guess = guess_models([documents])
-    if not guess.nodes and not guess.inputs:
+    if not guess.nodes and not guess.inputs and not guess.locals:
         return
     found = Declarations()
     options = replace(options, floats=True, any_type=True)

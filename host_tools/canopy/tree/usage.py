@@ -44,7 +44,7 @@ class Usage:
     """What was found.
 
     `scripted`: what scripts and literals give a type; `first`: the order of the first mention of an entry by anything
-    but an undeclared node; `mains`: the trees that can be main ones.
+    but an undeclared node; `literals`: what SetBlackboard writes; `mains`: the trees that can be main ones.
     """
 
     uses: list[Use] = field(default_factory=list)
@@ -52,6 +52,7 @@ class Usage:
     written: set[Key] = field(default_factory=set)
     scripted: set[Key] = field(default_factory=set)
     types: dict[Key, PortType] = field(default_factory=dict)
+    literals: dict[Key, list[str]] = field(default_factory=dict)
     first: dict[Key, int] = field(default_factory=dict)
     mains: dict[int, list[str]] = field(default_factory=dict)
     _parent: dict[Key, Key] = field(default_factory=dict)
@@ -213,6 +214,9 @@ class _Walk:
             if name == WRITTEN.get(node_id) or (node_id in LOOP_ITEMS and name == "value"):
                 if target.isidentifier() or target.startswith("@"):
                     self._usage.scripted.add(self.key(here, target))
+                    value = element.attributes.get("value", "") if name == "output_key" else ""
+                    if value and pointer(value, "") is None:
+                        self._usage.literals.setdefault(self.key(here, target), []).append(value)
                     self._usage.mention(self.key(here, target), writes=True, kind=LOOP_ITEMS.get(node_id))
             elif (inner is not None or name == "entry") and name not in SCRIPTS and "." not in target:
                 self._usage.mention(self.key(here, target))
