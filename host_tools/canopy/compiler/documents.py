@@ -19,7 +19,7 @@ MOST_TREES = 20
 UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
 # Attributes that any node and tree may have and that change nothing in a tick.
-PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath")
+PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath", "_trace")
 
 
 @dataclass

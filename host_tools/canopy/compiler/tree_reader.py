@@ -26,7 +26,7 @@ from canopy.tree.instance import Instance
 from canopy.tree.model_file import declare_guessed
 from canopy.tree.node_id import id_of
 from canopy.tree.parameters import read_parameter
-from canopy.tree.ports import bind_port, dotted_names
+from canopy.tree.ports import bind_port, dotted_names, is_traced
 from canopy.tree.search import complete
 from canopy.tree.undeclared import Unknown, stand_in
 
@@ -295,6 +295,10 @@ class _Builder:
             raise leaf.problem
         self._check_attributes(element, {port.name for port in leaf.ports})
         bound = tuple(self._bind_or_not(element, leaf, port, scope) for port in leaf.ports)
+        if is_traced(element):
+            for port in bound:
+                if isinstance(port.target, Entry):
+                    port.target.is_traced = True
         name = element.attributes.get("name", leaf.id)
         return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
 

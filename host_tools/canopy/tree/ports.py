@@ -27,6 +27,18 @@ def dotted_names(documents: Documents) -> set[str]:
     return {name.removeprefix("@") for name in found if "." in name}
 
 
+def is_traced(element: Element) -> bool:
+    """Are the entries of this node's ports in the trace?
+
+    Raises:
+        CompileError: `_trace` is neither yes nor no.
+    """
+    text = element.attributes.get("_trace", "no")
+    if text not in ("yes", "no"):
+        raise CompileError(element.attribute_place("_trace"), f"_trace='{text}' is neither yes nor no")
+    return text == "yes"
+
+
 def _may_be_unset(context: Context, port: Port) -> bool:
     """Outputs need not be connected; nor what no type asks to be, or C++ calls optional."""
     return port.direction == "out" or port.is_optional or port.type.kind == "any" or context.options.unset_ports
