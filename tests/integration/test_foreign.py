@@ -41,6 +41,7 @@ def tree(nodes: str, model: str = "", attributes: str = "") -> str:
         (tree("<A/>", '<Action ID="A" colour="red"/>'), ["colour"]),
         (tree("<A/>", '<Action ID="A"><MetadataFields><Metadata foo="1"/></MetadataFields></Action>'), ["foo"]),
         (tree("<A/>", '<Action ID="A"><MetadataFields><Icon path="a.svg"/></MetadataFields></Action>'), ["Icon"]),
+        (tree("<A/>", '<Action ID="A"/><MetadataFields><Metadata x="1"/></MetadataFields>'), ["MetadataFields"]),
         (tree('<A p="1"/>', '<Action ID="A"><input_port name="p" type="int" unit="m"/></Action>'), ["unit"]),
         (tree('<Script code="a := 1" _breakpoint="1"/>'), ["_breakpoint"]),
         (

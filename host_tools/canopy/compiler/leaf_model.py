@@ -339,6 +339,9 @@ def read_model(
     for element in model.children:
         if element.tag == ENUM_TAG:
             continue
+        if element.tag not in MODEL_TAGS and "ID" not in element.attributes:
+            foreign.leave(element.tag, element.place, "element", (*MODEL_TAGS, ENUM_TAG))
+            continue
         if element.tag not in MODEL_TAGS:
             raise CompileError(
                 element.place,
