@@ -14,6 +14,7 @@ from canopy.escape.terminal import CleanCommand, echo
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "model": ("canopy.tree.model_cli", "Write the declarations that tree files lack, guessed from use."),
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
