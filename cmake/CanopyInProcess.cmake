@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# canopy_add_in_process(NAME [WORLD function] [SOURCES world.c…] [LIBRARIES codec…])
+# canopy_add_in_process(NAME [IMAGE] [WORLD function] [SOURCES world.c…] [LIBRARIES codec…])
 #
 # Makes a shared library of an application of this folder, with the runtime in it: generated/NAME/NAME.so, beside
 # its model file, by the target NAME_in_process. The Python package canopy.inprocess loads it; each load is an
@@ -9,7 +9,7 @@
 #   canopy_add_in_process(nao_home)
 #
 # WORLD names a function `const canopy_world_t *function(void)` in SOURCES: what surrounds the application, in C
-# (canopy/in_process.h). Every source is compiled once more, as position-independent code.
+# (canopy/in_process.h). IMAGE: the application has IMAGE_NODES, and may be given another tree. Every source is compiled once more, as position-independent code.
 include_guard(GLOBAL)
 
 set(CANOPY_IN_PROCESS_DIR "${CMAKE_CURRENT_LIST_DIR}/..")
@@ -29,7 +29,7 @@ function(canopy_sources_of VARIABLE)
 endfunction()
 
 function(canopy_add_in_process NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 HOST "" "WORLD" "SOURCES;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 HOST "IMAGE" "WORLD" "SOURCES;LIBRARIES")
   if(HOST_UNPARSED_ARGUMENTS OR NOT TARGET ${NAME}_application)
     message(FATAL_ERROR "canopy_add_in_process(${NAME}): call canopy_add_application(${NAME} …) before it; "
                         "unknown arguments: ${HOST_UNPARSED_ARGUMENTS}")
@@ -48,7 +48,8 @@ function(canopy_add_in_process NAME)
   string(TOUPPER "${NAME}" upper)
   target_compile_definitions(
     ${NAME}_library PRIVATE CANOPY_IN_PROCESS=1 CANOPY_APP=${NAME}_app "CANOPY_BUS_HEADER=\"${NAME}_bus.h\""
-                            CANOPY_RX_MESSAGES=${upper}_RX_MESSAGES $<$<BOOL:${HOST_WORLD}>:CANOPY_WORLD=${HOST_WORLD}>)
+                            CANOPY_RX_MESSAGES=${upper}_RX_MESSAGES $<$<BOOL:${HOST_WORLD}>:CANOPY_WORLD=${HOST_WORLD}>
+                            $<$<BOOL:${HOST_IMAGE}>:CANOPY_IMAGE=${NAME}_image>)
   target_compile_features(${NAME}_library PRIVATE c_std_11)
   target_link_options(${NAME}_library PRIVATE -Wl,-Bsymbolic)
   target_link_libraries(${NAME}_library PRIVATE $<TARGET_NAME_IF_EXISTS:canopy_warnings>)

@@ -90,12 +90,10 @@ canopy_error_t canopy_in_process_init(canopy_in_process_t *self, const canopy_ap
                                              .health_every = 1,
                                              .model_every = 1,
                                              .changes_max = 1};
-    if (!with_trace) {
-        self->app.trace = &self->no_trace;
-    }
+    self->app.trace = &self->no_trace;
     self->can = (canopy_can_t){.context = self, .receive = receive, .send = send, .is_filtered = true};
     self->clock = (canopy_clock_t){.context = self, .now = virtual_now, .wait_until = never_wait};
-    self->config = (canopy_loop_config_t){.app = &self->app,
+    self->config = (canopy_loop_config_t){.app = with_trace ? app : &self->app,
                                           .can = &self->can,
                                           .clock = &self->clock,
                                           /* one more than can be due: a cycle that took all knows that it did */
@@ -139,6 +137,16 @@ void canopy_in_process_hold(canopy_in_process_t *self, uint16_t message, bool is
     }
 }
 
+/** What each node is, or was before its parent reset it: a bit a status. */
+static void note_seen(const canopy_in_process_t *self)
+{
+    const canopy_tree_instance_t *tree = self->app.tree_instance;
+
+    for (uint16_t node = 0; node < tree->tree->node_count; node++) {
+        self->seen[node] = (uint8_t)(self->seen[node] | (1u << (tree->status[node] & ~CANOPY_STATUS_WAS)));
+    }
+}
+
 canopy_status_t canopy_in_process_tick(canopy_in_process_t *self)
 {
     const canopy_world_t *world = self->world;
@@ -156,6 +164,9 @@ canopy_status_t canopy_in_process_tick(canopy_in_process_t *self)
     self->taken = 0;
     self->now += self->app.period;
     self->ticks++;
+    if (self->seen != NULL) {
+        note_seen(self);
+    }
     self->has_ended = world != NULL && world->step != NULL && !world->step(world->context);
     return self->root;
 }

@@ -3,7 +3,7 @@
  * @file
  * The functions of an application's shared library, for canopy.inprocess in Python. One copy of the library holds one
  * instance. Compiled with CANOPY_APP (the application's object), CANOPY_BUS_HEADER and in it CANOPY_RX_MESSAGES, and
- * CANOPY_WORLD, the name of a function that gives the world, or without it.
+ * CANOPY_WORLD, the name of a function that gives the world, or without it; with CANOPY_IMAGE where it takes tree images.
  *
  * Bounds are checked here, for whoever calls is not C: a number out of range gives an error, never a crash.
  */
@@ -12,6 +12,11 @@
 #include "canopy/in_process.h"
 
 #include CANOPY_BUS_HEADER
+#ifdef CANOPY_IMAGE
+#include "canopy/image.h"
+
+extern const canopy_image_app_t CANOPY_IMAGE;
+#endif
 
 /** Of the functions below; the Python side refuses a library with another one. */
 enum { VERSION = 1 };
@@ -45,6 +50,8 @@ uint32_t canopy_library_faults(void);
 uint32_t canopy_library_rejected(void);
 const uint8_t *canopy_library_statuses(void);
 void canopy_library_halt(void);
+void canopy_library_watch(uint8_t *seen);
+int canopy_library_run_image(const uint8_t *bytes, size_t size);
 const void *canopy_library_entry(uint32_t index, canopy_in_process_entry_t *entry);
 
 uint32_t canopy_library_version(void)
@@ -64,12 +71,12 @@ uint64_t canopy_library_period(void)
 
 uint32_t canopy_library_hash(void)
 {
-    return CANOPY_APP.tree->hash;
+    return CANOPY_APP.tree_instance->tree->hash;
 }
 
 uint32_t canopy_library_nodes(void)
 {
-    return CANOPY_APP.tree->node_count;
+    return CANOPY_APP.tree_instance->tree->node_count;
 }
 
 int canopy_library_open(bool with_trace)
@@ -168,6 +175,28 @@ const uint8_t *canopy_library_statuses(void)
 void canopy_library_halt(void)
 {
     canopy_tree_halt(CANOPY_APP.tree_instance);
+}
+
+/** From now on `seen` collects what each node has been: as many bytes as the tree has nodes. NULL: no more. */
+void canopy_library_watch(uint8_t *seen)
+{
+    host.seen = seen;
+}
+
+/** @return 0; else a canopy_image_error_t, or minus a canopy_error_t. */
+int canopy_library_run_image(const uint8_t *bytes, size_t size)
+{
+#ifdef CANOPY_IMAGE
+    uint16_t where;
+    canopy_image_error_t error = canopy_image_load(&CANOPY_IMAGE, bytes, size, &where);
+
+    host.seen = NULL; /* it is as long as the old tree */
+    return error != CANOPY_IMAGE_OK ? (int)error : canopy_image_run(&CANOPY_IMAGE, &host.loop, host.now);
+#else
+    (void)bytes;
+    (void)size;
+    return CANOPY_ERROR_NOT_FOUND;
+#endif
 }
 
 /* A table of an application without entries: a place that nobody reads. */

@@ -53,7 +53,7 @@ struct canopy_in_process {
     canopy_status_t root; /**< Of the last tick. */
     bool has_ended;       /**< The world's last step said so. */
     canopy_loop_t loop;
-    canopy_app_t app; /* the application's, with `no_trace` where none is wanted */
+    canopy_app_t app; /* the application's, with `no_trace`: what runs where none is wanted */
     canopy_trace_config_t no_trace;
     canopy_can_t can;
     canopy_clock_t clock;
@@ -66,6 +66,8 @@ struct canopy_in_process {
     /** Told of every frame, those that come in and those that go out, in their order. NULL: nobody. */
     void (*tap)(void *context, const canopy_can_frame_t *frame);
     void *tap_context;
+    /** A byte per node: bit s is set once the node has had status s. NULL: nobody wants to know. */
+    uint8_t *seen;
 };
 
 /** What canopy_in_process_find() gives when there is no such message. */
@@ -124,7 +126,8 @@ typedef struct {
     const char *step; /**< Of fixed point; else "1". */
     uint32_t size;    /**< [bytes] */
     const void *address;
-    char kind; /**< 'b' bool, 'i' signed, 'u' unsigned, 'f' floating point, 't' place in the table of texts, 'o' other. */
+    char
+        kind; /**< 'b' bool, 'i' signed, 'u' unsigned, 'f' floating point, 't' place in the table of texts, 'o' other. */
 } canopy_in_process_entry_t;
 
 #endif

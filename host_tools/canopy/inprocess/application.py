@@ -12,6 +12,7 @@ from typing import Any
 from cantools.database.can import Message, Signal
 
 from canopy.compiler.errors import nearest
+from canopy.files import FileError, read_bytes
 from canopy.inprocess.library import DATA_MAX, NONE, EntryPlace, InProcessError, Library
 from canopy.model import ModelError, load_model
 from canopy.signals import load_database, message_attribute
@@ -115,10 +116,33 @@ class Application:
                 place = call["sends"](message.frame_id, message.is_extended_frame)
                 self._outputs[message.name] = (message, self._known(place, message))
         self._entries = {entry.name: entry for entry in self.library.entries()}
-        self._dirty: set[str] = set()
         self._nodes: dict[str, list[int]] = {}
+        self._name_nodes()
+
+    def _name_nodes(self) -> None:
+        self._nodes = {}
         for node in self.model.nodes:
             self._nodes.setdefault(node.name, []).append(node.index)
+
+    def run_image(self, image: Path, model: Path) -> None:
+        """Another tree: loads an image, and goes on with it. Every entry has its first value again.
+
+        Args:
+            image: Of `canopy image build` for this application.
+            model: Its model file (`canopy image build --model`).
+
+        Raises:
+            InProcessError: One of them cannot be read, or the application rejects the image; then nothing is changed.
+        """
+        try:
+            new, data = load_model(model), read_bytes(image)
+        except (ModelError, FileError) as error:
+            raise InProcessError(f"{image}: {error}") from error
+        self.library.run_image(data)
+        if self.library.nodes != len(new.nodes):
+            raise InProcessError(f"{model}: is not the model of {image}: it has {len(new.nodes)} nodes")
+        self.model = new
+        self._name_nodes()
 
     def _known(self, place: int, message: Message) -> int:
         if place == NONE:
@@ -176,6 +200,15 @@ class Application:
     def root(self) -> Status:
         """What the root returned last."""
         return Status(self.library.call["root"]())
+
+    def watch(self) -> None:
+        """From now on seen() collects; what was collected before is forgotten."""
+        self.library.watch()
+
+    def seen(self, node: str | int) -> set[Status]:
+        """Every status that a node has had after a tick since watch(), also where its parent has reset it."""
+        bits = self.library.seen()[self.index(node)]
+        return {status for status in Status if 0 <= status < Status.PREVIOUSLY and bits >> status & 1}
 
     @property
     def now(self) -> float:

@@ -73,6 +73,8 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "rejected": (_U32, ()),
     "statuses": (ctypes.c_void_p, ()),
     "halt": (None, ()),
+    "watch": (None, (ctypes.c_void_p,)),
+    "run_image": (_INT, (_BYTES, ctypes.c_size_t)),
     "entry": (ctypes.c_void_p, (_U32, ctypes.POINTER(_CEntry))),
 }
 
@@ -114,8 +116,13 @@ class Library:
         error = self.call["open"](trace)
         if error != 0:
             raise InProcessError(f"{path}: the application's tables are not complete: error {error}")
-        self.nodes: int = self.call["nodes"]()
+        self.nodes = 0
+        self._look_at_tree()
+
+    def _look_at_tree(self) -> None:
+        self.nodes = int(self.call["nodes"]())
         self._statuses = (ctypes.c_uint8 * self.nodes).from_address(self.call["statuses"]())
+        self._seen: Any = None
 
     def function(self, name: str, result: Any, *arguments: Any) -> Any:
         """A function of the library, a world's own one for example, with its ctypes.
@@ -135,6 +142,29 @@ class Library:
     def statuses(self) -> bytes:
         """The status code of every node now, in depth-first order."""
         return bytes(self._statuses)
+
+    def watch(self) -> None:
+        """From now on collects what each node has been; forgets what it has collected."""
+        self._seen = (ctypes.c_uint8 * self.nodes)()
+        self.call["watch"](self._seen)
+
+    def seen(self) -> bytes:
+        """A byte per node since watch(): bit s is set once the node has had status s."""
+        return bytes(self._seen) if self._seen is not None else bytes(self.nodes)
+
+    def run_image(self, image: bytes) -> None:
+        """Loads a tree image, and lets its tree begin in the place of the one that runs (docs/image.md).
+
+        Raises:
+            InProcessError: The application takes no images, or not this one.
+        """
+        error = self.call["run_image"](image, len(image))
+        if error != 0:
+            raise InProcessError(
+                f"{self.path}: the image is rejected with error {error}: it must be built for this application, and that "
+                "with IMAGE_NODES; canopy_add_in_process() needs IMAGE"
+            )
+        self._look_at_tree()
 
     def entries(self) -> list[EntryPlace]:
         """The blackboard's entries."""
