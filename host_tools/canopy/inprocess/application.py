@@ -205,10 +205,10 @@ class Application:
         """From now on seen() collects; what was collected before is forgotten."""
         self.library.watch()
 
-    def seen(self, node: str | int) -> set[Status]:
+    def seen(self, node: str | int) -> frozenset[Status]:
         """Every status that a node has had after a tick since watch(), also where its parent has reset it."""
         bits = self.library.seen()[self.index(node)]
-        return {status for status in Status if 0 <= status < Status.PREVIOUSLY and bits >> status & 1}
+        return frozenset(status for status in Status if 0 <= status < Status.PREVIOUSLY and bits >> status & 1)
 
     @property
     def now(self) -> float:

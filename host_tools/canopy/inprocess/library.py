@@ -161,8 +161,8 @@ class Library:
         error = self.call["run_image"](image, len(image))
         if error != 0:
             raise InProcessError(
-                f"{self.path}: the image is rejected with error {error}: it must be built for this application, and that "
-                "with IMAGE_NODES; canopy_add_in_process() needs IMAGE"
+                f"{self.path}: the image is rejected with error {error}: it must be built for this application, which "
+                "must have IMAGE_NODES; canopy_add_in_process() needs IMAGE"
             )
         self._look_at_tree()
 
