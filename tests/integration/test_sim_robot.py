@@ -12,11 +12,12 @@ import can
 import pytest
 from e2e.p11 import e2e_p11_protect
 
+from canopy_sim.deeds import Deed, Kind
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.messages import RobotMessages, load_messages
 from canopy_sim.plant import Plant
 from canopy_sim.process import Simulation, _Timer
-from canopy_sim.robot import CommandKind, DeskCommand, Robot
+from canopy_sim.robot import Robot
 from integration.sim_peers import DBC
 
 POWER_COMMAND, TICK = 0x200, 0x600
@@ -140,17 +141,17 @@ def test_real_time_makes_a_power_step_every_tenth_step(robot: Robot, plant: Plan
 
 def test_set_state_is_all_or_nothing(robot: Robot, plant: Plant) -> None:
     refused = [
-        DeskCommand(CommandKind.SET_STATE, battery=200, head_x=0.1),
-        DeskCommand(CommandKind.SET_STATE, battery=20, head_height=-0.1),
-        DeskCommand(CommandKind.SET_STATE, battery=20, charger_distance=float("inf")),
-        DeskCommand(CommandKind.SET_STATE, battery=20, charger_distance=1e300),
+        Deed(Kind.SET_STATE, battery=200, head_x=0.1),
+        Deed(Kind.SET_STATE, battery=20, head_height=-0.1),
+        Deed(Kind.SET_STATE, battery=20, charger_distance=float("inf")),
+        Deed(Kind.SET_STATE, battery=20, charger_distance=1e300),
     ]
     for command in refused:
         with pytest.raises(ValueError, match="out of range"):
             robot.execute(command)
         assert (plant.distance_mm, plant.battery) == (80_000, 500)
         assert (plant.head_x_mm, plant.head_height_mm) == (500, 0)
-    robot.execute(DeskCommand(CommandKind.SET_STATE, battery=19.9, charger_distance=0.3, head_x=0.29, head_height=0.48))
+    robot.execute(Deed(Kind.SET_STATE, battery=19.9, charger_distance=0.3, head_x=0.29, head_height=0.48))
     assert (plant.distance_mm, plant.battery) == (300, 199)
     assert (plant.head_x_mm, plant.head_height_mm) == (290, 480)
     assert robot.minimum_battery == 199
@@ -176,7 +177,7 @@ def test_a_late_timer_skips_and_stays_on_its_grid() -> None:
 
 def test_a_robot_that_sends_no_sensors_still_gives_the_steps(robot: Robot, messages: RobotMessages) -> None:
     """STOP_SENDING is a fault of the sensors; SimulationStep is the clock of the simulation."""
-    robot.execute(DeskCommand(CommandKind.STOP_SENDING))
+    robot.execute(Deed(Kind.STOP_SENDING))
     tick = can.Message(arbitration_id=TICK, is_extended_id=False, data=bytes(8))
     with can.Bus("sim", interface="virtual") as bus, can.Bus("sim", interface="virtual") as peer:
         simulation = Simulation(bus, messages, robot, steps=2)

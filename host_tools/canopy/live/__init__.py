@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Watching and telling what runs: over LCM and CAN."""
