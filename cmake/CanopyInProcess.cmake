@@ -12,8 +12,6 @@
 # (canopy/in_process.h). IMAGE: the application has IMAGE_NODES, and may be given another tree. Every source is compiled once more, as position-independent code.
 include_guard(GLOBAL)
 
-set(CANOPY_IN_PROCESS_DIR "${CMAKE_CURRENT_LIST_DIR}/..")
-
 # canopy_sources_of(VARIABLE TARGET…): absolute names of what the targets are compiled from, those that are generated too.
 function(canopy_sources_of VARIABLE)
   set(found "")
@@ -36,7 +34,7 @@ function(canopy_add_in_process NAME)
   endif()
   set(targets canopy_runtime canopy_in_process ${NAME}_application ${HOST_LIBRARIES})
   canopy_sources_of(sources ${targets})
-  list(APPEND sources ${HOST_SOURCES} "${CANOPY_IN_PROCESS_DIR}/drivers/in_process/library.c")
+  list(APPEND sources ${HOST_SOURCES} "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../drivers/in_process/library.c")
   add_library(${NAME}_library SHARED ${sources})
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
   set_target_properties(${NAME}_library PROPERTIES OUTPUT_NAME ${NAME} PREFIX "" SUFFIX ".so"
@@ -52,5 +50,9 @@ function(canopy_add_in_process NAME)
                             $<$<BOOL:${HOST_IMAGE}>:CANOPY_IMAGE=${NAME}_image>)
   target_compile_features(${NAME}_library PRIVATE c_std_11)
   target_link_options(${NAME}_library PRIVATE -Wl,-Bsymbolic)
+  if(CANOPY_SANITIZE) # Python has no sanitizer's runtime in it, and could not load the library
+    target_compile_options(${NAME}_library PRIVATE -fno-sanitize=all)
+    target_link_options(${NAME}_library PRIVATE -fno-sanitize=all)
+  endif()
   target_link_libraries(${NAME}_library PRIVATE $<TARGET_NAME_IF_EXISTS:canopy_warnings>)
 endfunction()

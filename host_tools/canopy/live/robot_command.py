@@ -56,11 +56,11 @@ def _message(command: str, **fields: float) -> Any:
 
 def send(ctx: click.Context, command: str, **fields: float) -> None:
     """Sends one command, and looks whether a robot is there that takes it; if not, says so and ends with 1."""
-    from canopy_msgs.robot_event_t import robot_event_t
-
     link = open_lcm(str(ctx.obj), "canopy sim")
     if link is None:
         sys.exit(1)
+    from canopy_msgs.robot_event_t import robot_event_t  # open_lcm() has looked whether it is there
+
     states: list[bytes] = []
     refusals: list[str] = []
 
