@@ -187,11 +187,17 @@ void canopy_library_watch(uint8_t *seen)
 int canopy_library_run_image(const uint8_t *bytes, size_t size)
 {
 #ifdef CANOPY_IMAGE
+    const canopy_app_t *without_trace = host.config.app;
     uint16_t where;
-    canopy_image_error_t error = canopy_image_load(&CANOPY_IMAGE, bytes, size, &where);
+    int error = (int)canopy_image_load(&CANOPY_IMAGE, bytes, size, &where);
 
-    host.seen = NULL; /* it is as long as the old tree */
-    return error != CANOPY_IMAGE_OK ? (int)error : canopy_image_run(&CANOPY_IMAGE, &host.loop, host.now);
+    if (error == (int)CANOPY_IMAGE_OK) {
+        host.seen = NULL;              /* it is as long as the old tree */
+        host.config.app = &CANOPY_APP; /* an image wants the application itself, and no copy */
+        error = (int)canopy_image_run(&CANOPY_IMAGE, &host.loop, host.now);
+        host.config.app = without_trace;
+    }
+    return error;
 #else
     (void)bytes;
     (void)size;

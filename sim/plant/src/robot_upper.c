@@ -95,9 +95,10 @@ static void step_ball(canopy_sim_robot_t *robot, bool is_looking)
 
 bool canopy_sim_step_upper(canopy_sim_robot_t *robot, const canopy_sim_command_t *command)
 {
+    step_ball(robot,
+              command->track_ball); /* before the arms: a ball that they throw in this step is in the air after it */
     step_arms(robot, command);
     (void)step_act(&robot->speech, (uint8_t)command->say, command->say_number, robot->figures->say_ms,
                    robot->figures->step_ms);
-    step_ball(robot, command->track_ball);
     return command->arms != CANOPY_SIM_ARMS_STOP || command->say != CANOPY_SIM_SAY_NOTHING || command->track_ball;
 }
