@@ -134,7 +134,7 @@ def test_a_bumper_is_answered_in_its_tick(build_dir: Path, corrected: bool) -> N
 
 @pytest.mark.parametrize("corrected", [False, True])
 def test_the_battery_never_falls_below_its_floor(build_dir: Path, corrected: bool) -> None:
-    """Lemma 10 in its right form: the floor is reached from the corner of I; whoever begins full keeps 10 %."""
+    """Lemma 10 in its right form: 5 %, reached from the corner of I. Around its place of work it keeps more."""
     mission = start(build_dir, Profile.paper, corrected=corrected, seed=SEED)
     plant = mission.plant
     # A robot that must stand to walk loses 0.2 % each time that it is pushed over on its way: here nobody does.
@@ -156,7 +156,8 @@ def test_the_battery_never_falls_below_its_floor(build_dir: Path, corrected: boo
     plant.set_power(100 * 10**9, 1000)
     mission.least_battery(again=True)
     mission.run(hours // 2 * STEPS_PER_HOUR)
-    assert mission.least_battery() >= 10.0
+    # From 50 m it takes 51 steps: 20 - 5.1; where toes may hold it up until 15 %, 15 - 5.1.
+    assert mission.least_battery() == (9.9 if corrected else 14.9)
 
 
 def test_an_hour_takes_a_third_of_a_second(build_dir: Path) -> None:
