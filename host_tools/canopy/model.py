@@ -67,7 +67,7 @@ class Model:
     dbc_hash: str | None
     """Of the DBC that the firmware was built with; None: not known."""
     trace: dict[str, int]
-    """Arbitration id of each trace message the DBC has; always CanopyTick."""
+    """Arbitration id of each trace message the DBC has; of a traced application always CanopyTick."""
 
     def depth(self, index: int) -> int:
         """Number of ancestors of a node; 0 for the root."""
@@ -79,8 +79,12 @@ class Model:
         return depth
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path, *, traced: bool = True) -> Model:
     """Reads and checks a model file.
+
+    Args:
+        path: The file.
+        traced: Whether the application must have a trace, for who watches it on its bus.
 
     Raises:
         ModelError: The file or its DBC is not there, or is not what `canopy compile` of this version writes.
@@ -93,7 +97,7 @@ def load_model(path: Path) -> Model:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ModelError(f"{path}: is no JSON: {error}") from error
-    model = _Reader(path, data).model()
+    model = _Reader(path, data, traced=traced).model()
     if not model.dbc.is_file():
         raise ModelError(f"{path}: bus.dbc: {model.dbc} is not there; it is written beside the model file")
     return model
@@ -102,9 +106,10 @@ def load_model(path: Path) -> Model:
 class _Reader:
     """Takes values out of the parsed JSON and names the place of the first one that is not as it should be."""
 
-    def __init__(self, path: Path, data: Any) -> None:
+    def __init__(self, path: Path, data: Any, *, traced: bool) -> None:
         self._path = path
         self._data = data
+        self._traced = traced
 
     def model(self) -> Model:
         data = self._object(self._data, "the file")
@@ -171,7 +176,7 @@ class _Reader:
         return node
 
     def _trace(self, data: dict[str, Any]) -> dict[str, int]:
-        if "CanopyTick" not in data:
+        if self._traced and "CanopyTick" not in data:
             raise self._error("trace", "has no CanopyTick: the DBC has no trace messages, so nothing can be watched")
         trace = {name: self._number(data, "trace.", name, 0, ID_MAX) for name in TRACE_MESSAGES if name in data}
         if len(set(trace.values())) != len(trace):

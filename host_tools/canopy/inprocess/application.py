@@ -98,7 +98,7 @@ class Application:
             InProcessError: A file is not there, or not what it should be, or the two do not belong together.
         """
         try:
-            self.model = load_model(model)
+            self.model = load_model(model, traced=False)
             database = load_database(self.model)
         except ModelError as error:
             raise InProcessError(str(error)) from error
@@ -135,7 +135,7 @@ class Application:
             InProcessError: One of them cannot be read, or the application rejects the image; then nothing is changed.
         """
         try:
-            new, data = load_model(model), read_bytes(image)
+            new, data = load_model(model, traced=False), read_bytes(image)
         except (ModelError, FileError) as error:
             raise InProcessError(f"{image}: {error}") from error
         self.library.run_image(data)
@@ -291,11 +291,15 @@ class Application:
         place = self._entry(name)
         if place.kind == "t":
             raise InProcessError(f"entry '{name}' holds a text of the tree, and only leaves write those")
-        raw = round(Fraction(str(value)) / Fraction(place.step)) if place.kind in "iu" else value
         cell = _ctype(place).from_address(place.address)
         before = cell.value
-        cell.value = raw
-        if place.kind != "f" and cell.value != raw:
+        raw: int | float | bool | None = value
+        if place.kind in "iu":
+            steps = Fraction(str(value)) / Fraction(place.step)
+            raw = steps.numerator if steps.denominator == 1 else None
+        if raw is not None:
+            cell.value = raw
+        if raw is None or (place.kind != "f" and cell.value != raw):
             cell.value = before
             raise InProcessError(f"entry '{name}' is {place.type} in steps of {place.step}, and cannot be {value}")
 

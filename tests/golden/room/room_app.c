@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xcede377726b63000u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_APP_H != 0xcede377726b63000u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xcede377726b63000u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -138,3 +138,20 @@ const canopy_app_t room_app = {
     .trace_state = &memory.trace,
     .sent = memory.sent,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 0u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif
