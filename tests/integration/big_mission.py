@@ -22,11 +22,18 @@ class Stage(Protocol):
     """Where the mission is played."""
 
     def say(self, wish: Wish) -> None: ...
-    def push_over(self) -> None: ...
+    def push_over(self) -> None:
+        """When it comes back the robot has lain."""
+        ...
+
     def press_toes(self) -> None: ...
     def drain(self, percent: float) -> None: ...
     def shows(self, signal: str) -> str:
         """A sensor's or a command's value now, by `Message.Signal`, as the DBC names it."""
+        ...
+
+    def has_shown(self, signal: str, value: str) -> bool:
+        """As shows(), but also true when it was so at any time since the last deed began."""
         ...
 
     def wait(self, what: str, condition: Callable[[], bool], seconds: float) -> None:
@@ -94,6 +101,9 @@ class InProcess:
         }
         return shown[signal] if signal in shown else str(self.mission.application.output(signal))
 
+    def has_shown(self, signal: str, value: str) -> bool:
+        return self.shows(signal) == value
+
     def wait(self, what: str, condition: Callable[[], bool], seconds: float) -> None:
         ticks = round(seconds * 1000 / self.plant.step_ms)
         for _ in range(ticks):
@@ -124,7 +134,6 @@ def play(stage: Stage, *, corrected: bool) -> None:
     stage.say(Wish.Sit)
     until("Posture.Name", "Sit")
     stage.push_over()
-    stage.wait("it lies", lambda: stage.shows("Posture.Name").startswith("Lying"), 10)
     until("Posture.Name", "Sit")
     stage.say(Wish.SayGoodbye)
     stage.wait(
@@ -135,15 +144,14 @@ def play(stage: Stage, *, corrected: bool) -> None:
     stage.pass_time(5)
     _play_ball(stage, until, corrected=corrected)
     stage.press_toes()
-    until("PostureCommand.Mode", "BackOff", 10)
-    until("UpperCommand.Say", "Ouch", 10)
+    for signal, value in (("PostureCommand.Mode", "BackOff"), ("UpperCommand.Say", "Ouch")):
+        stage.wait(f"{signal} was {value}", lambda: stage.has_shown(signal, value), 10)  # noqa: B023  (called at once)
     until("Touch.ToeLeftInner", "0", 60)
     stage.drain(19)
     until("PowerCommand.Mode", "DriveToCharger", 20)
     if corrected:
         stage.push_over()
-        stage.wait("it lies", lambda: stage.shows("Posture.Name").startswith("Lying"), 10)
-    until("Battery.Charging", "1", 1200)
+        until("Battery.Charging", "1", 1200)
 
 
 def _play_ball(stage: Stage, until: Callable[..., None], *, corrected: bool) -> None:
@@ -153,7 +161,6 @@ def _play_ball(stage: Stage, until: Callable[..., None], *, corrected: bool) -> 
     stage.say(Wish.BallGame)
     until("Ball.Hand", "Threw", 300)
     stage.push_over()
-    stage.wait("it lies", lambda: stage.shows("Posture.Name").startswith("Lying"), 10)
     if corrected:
         until("Posture.Name", "Stand")
         return

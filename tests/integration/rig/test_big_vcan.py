@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: MIT
+"""The Big BT's mission on vcan0."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from integration import big_processes
+
+
+@pytest.mark.timeout(600)  # one shared CPU in the guest
+@pytest.mark.parametrize("corrected", [True, False])
+def test_the_mission_is_played(build_dir: Path, corrected: bool) -> None:
+    big_processes.the_mission_is_played(build_dir, "socketcan:vcan0", corrected=corrected, factor=5)
