@@ -3,7 +3,8 @@
 #include "in_process.h"
 
 const canopy_world_t *nao_library_world(void);
-nao_world_t *nao_library_robot(void);
+canopy_sim_nao_t *nao_library_robot(void);
+int32_t nao_library_least_battery(bool again);
 
 static nao_world_t nao;
 
@@ -12,7 +13,17 @@ const canopy_world_t *nao_library_world(void)
     return nao_world_init(&nao);
 }
 
-nao_world_t *nao_library_robot(void)
+canopy_sim_nao_t *nao_library_robot(void)
 {
-    return &nao;
+    return &nao.robot;
+}
+
+int32_t nao_library_least_battery(bool again)
+{
+    int32_t least = nao.least_battery;
+
+    if (again) {
+        nao.least_battery = nao.robot.power.battery;
+    }
+    return least;
 }

@@ -9,6 +9,7 @@ e2e          AUTOSAR E2E Profile 11: protect what is sent, check what is receive
 frames       frames of the DBC: packed, protected, checked
 messages     the robot's side of the DBC
 robot        commands in, freshness, the step of the plant, sensors out
+small_mission  Examples 4 and 5 and their robot in this process
 mission      the Big BT and its robot in this process, without a bus
 process      the event loops on the bus: lock-step and real time
 summary      what a run amounts to, as JSON and as text
