@@ -235,7 +235,7 @@ def test_a_full_transmit_buffer_drops_and_goes_on(robot: Robot, messages: RobotM
 
 
 def test_a_step_of_lock_step_is_quick(messages: RobotMessages, plant: Plant) -> None:
-    """The robot's part of 3,000 ticks a second with the controller's and the bus's: CPU of this process, best of five."""
+    """The robot's part of a tick, beside the controller's and the bus's: CPU of this process, best of five."""
     took = []
     for _ in range(5):
         robot = Robot(messages, plant)
@@ -248,4 +248,4 @@ def test_a_step_of_lock_step_is_quick(messages: RobotMessages, plant: Plant) -> 
             robot.lock_step(0.0)
         took.append(time.process_time() - begin)
         assert robot.steps == 1000
-    assert min(took) < 0.15
+    assert min(took) < 0.1  # 18 us a tick where nothing else runs
