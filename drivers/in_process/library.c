@@ -7,6 +7,8 @@
  *
  * Bounds are checked here, for whoever calls is not C: a number out of range gives an error, never a crash.
  */
+#include "library.h"
+
 #include <stddef.h>
 
 #include "canopy/in_process.h"
@@ -21,7 +23,7 @@ extern const canopy_image_app_t CANOPY_IMAGE;
 /** Of the functions below; the Python side refuses a library with another one. */
 enum { VERSION = 1 };
 
-enum { SENSORS = CANOPY_RX_MESSAGES > 0u ? CANOPY_RX_MESSAGES : 1u };
+enum { SENSORS = CANOPY_RX_MESSAGES + 1u }; /* an array of none is none in C */
 
 extern const canopy_app_t CANOPY_APP;
 #ifdef CANOPY_WORLD
@@ -30,29 +32,6 @@ const canopy_world_t *CANOPY_WORLD(void);
 
 static canopy_in_process_t host;
 static canopy_in_process_sensor_t sensors[SENSORS];
-
-uint32_t canopy_library_version(void);
-const char *canopy_library_name(void);
-uint64_t canopy_library_period(void);
-uint32_t canopy_library_hash(void);
-uint32_t canopy_library_nodes(void);
-int canopy_library_open(bool with_trace);
-uint32_t canopy_library_receives(uint32_t id, bool is_extended);
-uint32_t canopy_library_sends(uint32_t id, bool is_extended);
-int canopy_library_put(uint32_t message, const uint8_t *data, uint32_t length, uint64_t age);
-int canopy_library_hold(uint32_t message, bool is_held);
-int canopy_library_read(uint32_t message, uint8_t *data, uint32_t size);
-uint64_t canopy_library_run(uint64_t ticks, uint32_t until);
-uint32_t canopy_library_root(void);
-uint64_t canopy_library_now(void);
-int canopy_library_set_now(uint64_t now);
-uint32_t canopy_library_faults(void);
-uint32_t canopy_library_rejected(void);
-const uint8_t *canopy_library_statuses(void);
-void canopy_library_halt(void);
-void canopy_library_watch(uint8_t *seen);
-int canopy_library_run_image(const uint8_t *bytes, size_t size);
-const void *canopy_library_entry(uint32_t index, canopy_in_process_entry_t *entry);
 
 uint32_t canopy_library_version(void)
 {
@@ -191,7 +170,7 @@ int canopy_library_run_image(const uint8_t *bytes, size_t size)
     uint16_t where;
     int error = (int)canopy_image_load(&CANOPY_IMAGE, bytes, size, &where);
 
-    if (error == (int)CANOPY_IMAGE_OK) {
+    if (error == CANOPY_IMAGE_OK) {
         host.seen = NULL;              /* it is as long as the old tree */
         host.config.app = &CANOPY_APP; /* an image wants the application itself, and no copy */
         error = (int)canopy_image_run(&CANOPY_IMAGE, &host.loop, host.now);
@@ -204,10 +183,6 @@ int canopy_library_run_image(const uint8_t *bytes, size_t size)
     return CANOPY_ERROR_NOT_FOUND;
 #endif
 }
-
-/* A table of an application without entries: a place that nobody reads. */
-extern const canopy_in_process_entry_t canopy_in_process_entries[];
-extern const uint32_t canopy_in_process_entry_count;
 
 const void *canopy_library_entry(uint32_t index, canopy_in_process_entry_t *entry)
 {

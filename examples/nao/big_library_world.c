@@ -1,12 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file The whole robot in the shared library of the Big BT (cmake/CanopyInProcess.cmake), for Python. */
-#include "big_world.h"
-
-const canopy_world_t *big_library_world(void);
-void big_library_begin(int profile, uint32_t seed);
-canopy_sim_robot_t *big_library_robot(void);
-void big_library_people(uint32_t deeds, uint32_t every);
-int32_t big_library_least_battery(bool again);
+#include "big_library_world.h"
 
 static big_world_t big;
 

@@ -12,7 +12,8 @@ static void sense(void *context, canopy_in_process_t *host)
                              .charger_distance = canopy_sim_power_distance_mm(&self->robot.power)};
     nao_posture_t posture = {.head_x = (int16_t)self->robot.posture.head_x_mm,
                              .head_height = (uint16_t)self->robot.posture.head_height_mm};
-    uint8_t data[NAO_BATTERY_LENGTH > NAO_POSTURE_LENGTH ? NAO_BATTERY_LENGTH : NAO_POSTURE_LENGTH];
+    uint8_t battery_data[NAO_BATTERY_LENGTH];
+    uint8_t posture_data[NAO_POSTURE_LENGTH];
 
     if (!self->is_known) {
         self->battery = canopy_in_process_find(host, NAO_BATTERY_ID, false);
@@ -21,10 +22,10 @@ static void sense(void *context, canopy_in_process_t *host)
     }
     self->next_power = CANOPY_SIM_POWER_STOP;
     self->next_posture = CANOPY_SIM_POSTURE_STOP;
-    (void)nao_battery_encode(&battery, data, sizeof data);
-    canopy_in_process_put(host, self->battery, data, self->age);
-    (void)nao_posture_encode(&posture, data, sizeof data);
-    canopy_in_process_put(host, self->posture, data, self->age);
+    (void)nao_battery_encode(&battery, battery_data, sizeof battery_data);
+    canopy_in_process_put(host, self->battery, battery_data, self->age);
+    (void)nao_posture_encode(&posture, posture_data, sizeof posture_data);
+    canopy_in_process_put(host, self->posture, posture_data, self->age);
 }
 
 static void take(void *context, const canopy_can_frame_t *frame)

@@ -1,10 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file The robot of nao.dbc in the shared library of a controller (cmake/CanopyInProcess.cmake), for Python. */
-#include "in_process.h"
-
-const canopy_world_t *nao_library_world(void);
-canopy_sim_nao_t *nao_library_robot(void);
-int32_t nao_library_least_battery(bool again);
+#include "library_world.h"
 
 static nao_world_t nao;
 

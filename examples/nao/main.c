@@ -278,10 +278,10 @@ static canopy_error_t close_bus(void)
     return error;
 }
 
+#ifdef CANOPY_IMAGE
 /** Lets the tree of an image begin, if one was asked for. @return false: the message says why. */
 static bool run_image(char *message, size_t size)
 {
-#ifdef CANOPY_IMAGE
     static uint8_t bytes[IMAGE_MAX];
     const canopy_clock_t *clock = loop.config->clock;
     uint16_t where = 0;
@@ -305,12 +305,9 @@ static bool run_image(char *message, size_t size)
         return false;
     }
     (void)canopy_image_run(&CANOPY_IMAGE, &loop, clock->now(clock->context));
-#else
-    (void)message;
-    (void)size;
-#endif
     return true;
 }
+#endif
 
 int main(int argc, char **argv)
 {
@@ -329,10 +326,12 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s: the application's tables are not complete: error %d\n", CANOPY_APP.name, (int)error);
         return EXIT_FAILURE;
     }
+#ifdef CANOPY_IMAGE
     if (!run_image(message, sizeof message)) {
         fprintf(stderr, "%s: %s\n", CANOPY_APP.name, message);
         return EXIT_FAILURE;
     }
+#endif
     stopped = canopy_loop_run(&loop);
     if (!options.quiet) {
         print_summary(config.can);

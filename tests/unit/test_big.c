@@ -38,7 +38,11 @@ static canopy_status_t account(unsigned kind, uint16_t use, bool was_running, ca
 {
     bool runs = status == CANOPY_RUNNING;
 
-    note(use < (uint16_t)USES_MAX && is_running[kind][use] == was_running);
+    if (use >= (uint16_t)USES_MAX) {
+        wrong++;
+        return status;
+    }
+    note(is_running[kind][use] == was_running);
     begun += runs && !was_running ? 1u : 0u;
     completed += !runs && was_running ? 1u : 0u;
     is_running[kind][use] = runs;
@@ -47,9 +51,13 @@ static canopy_status_t account(unsigned kind, uint16_t use, bool was_running, ca
 
 static void account_halt(unsigned kind, uint16_t use)
 {
-    note(use < (uint16_t)USES_MAX && is_running[kind][use]);
-    is_running[kind][use] = false;
     halted++;
+    if (use >= (uint16_t)USES_MAX) {
+        wrong++;
+        return;
+    }
+    note(is_running[kind][use]);
+    is_running[kind][use] = false;
 }
 
 #define KIND(n)                                                           \
@@ -66,10 +74,11 @@ static void account_halt(unsigned kind, uint16_t use)
         account_halt(n, use);                                             \
         inner[n].halted(application, use);                                \
     }
-#define ALL(X)                                                                                                     \
-    X(0)                                                                                                           \
-    X(1) X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9) X(10) X(11) X(12) X(13) X(14) X(15) X(16) X(17) X(18) X(19) X(20) \
-        X(21) X(22) X(23) X(24) X(25) X(26) X(27) X(28) X(29) X(30) X(31)
+#define ALL(X)                                                                                                      \
+    X(0)                                                                                                            \
+    X(1)                                                                                                            \
+    X(2) X(3) X(4) X(5) X(6) X(7) X(8) X(9) X(10) X(11) X(12) X(13) X(14) X(15) X(16) X(17) X(18) X(19) X(20) X(21) \
+        X(22) X(23) X(24) X(25) X(26) X(27) X(28) X(29) X(30) X(31)
 ALL(KIND)
 #define ENTRY(n) {.tick = tick_##n, .running = running_##n, .halted = halted_##n},
 static const canopy_leaf_t books[KINDS_MAX] = {ALL(ENTRY)};
