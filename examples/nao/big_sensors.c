@@ -27,7 +27,7 @@ static void encode_posture(const canopy_sim_robot_t *robot, uint8_t *data)
 {
     big_posture_t posture = {.head_x = (int16_t)robot->nao.posture.head_x_mm,
                              .head_height = (uint16_t)robot->nao.posture.head_height_mm,
-                             .name = (big_posture_name_t)robot->pose};
+                             .name = (uint8_t)robot->pose};
 
     (void)big_posture_encode(&posture, data, LONGEST);
 }
