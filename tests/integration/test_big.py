@@ -161,15 +161,15 @@ def test_the_battery_never_falls_below_its_floor(build_dir: Path, corrected: boo
 
 
 def test_an_hour_takes_a_third_of_a_second(build_dir: Path) -> None:
-    """360,000 ticks of 10 ms: tree, loop, E2E, codec and plant. The best of five, for the machine is not ours alone."""
+    """360,000 ticks of 10 ms: tree, loop, E2E, codec and plant. CPU of this process, the best of five."""
     limit = 0.3 if sample(build_dir, 10) == 10 else 3.0
     mission = start(build_dir, Profile.nao, corrected=False)
     mission.let_people(PEOPLE, 3000)
     took = []
     for _ in range(5):
-        begin = time.perf_counter()
+        begin = time.process_time()
         mission.run(360_000)
-        took.append(time.perf_counter() - begin)
+        took.append(time.process_time() - begin)
     assert min(took) < limit
 
 
