@@ -5,6 +5,7 @@ plant        the robot's physics: the C library in sim/plant, typed
 sensors      what its sensors show, message by message
 deeds        what a person at a desk can do to it
 events       what happens to it, in words
+timetable    what is done to it at which time: a mission's file
 e2e          AUTOSAR E2E Profile 11: protect what is sent, check what is received
 frames       frames of the DBC: packed, protected, checked
 messages     the robot's side of the DBC

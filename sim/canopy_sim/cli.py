@@ -14,15 +14,18 @@ import can
 import click
 
 from canopy.canbus import CanBusError, open_bus, split_spec
+from canopy.compiler.errors import CompileError
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
+from canopy_sim.deeds import OF_WHOLE
 from canopy_sim.lcm_side import open_lcm_side
 from canopy_sim.messages import DescriptionError, RobotMessages, load_messages
 from canopy_sim.plant import Plant, Profile
 from canopy_sim.process import FASTEST, BusGoneError, Simulation
 from canopy_sim.robot import Robot
 from canopy_sim.summary import summarise, summary_text
+from canopy_sim.timetable import Event, load_timetable
 
 LARGEST = 10**9
 """Steps in one number of a Pair: what is below fits into the plant's integers, which then look closer."""
@@ -75,6 +78,14 @@ def read_dbc(_ctx: click.Context, _param: click.Parameter, value: Path) -> Robot
         raise click.BadParameter(str(error)) from error
 
 
+def read_timetable(_ctx: click.Context, _param: click.Parameter, value: Path | None) -> list[Event]:
+    """Reads the mission while the command line is read."""
+    try:
+        return [] if value is None else load_timetable(value)
+    except CompileError as error:
+        raise click.BadParameter(str(error)) from error
+
+
 def make_plant(
     power: tuple[int, int] | None, posture: tuple[int, int] | None, profile: Profile = Profile.paper, seed: int = 1
 ) -> Plant:
@@ -100,6 +111,8 @@ def make_plant(
 Examples:
   A controller in real time, the robot's clock 10 times as fast:
     canopy-sim --can unixbus:bus0 --dbc nao.dbc --time-factor 10
+  The whole robot, and what people do to it in a minute and a half:
+    canopy-sim --can unixbus:bus0 --dbc big.dbc --profile nao --mission missions/tour.toml
   Exactly 2000 steps, one for each tick of a controller that was started with --lock-step:
     canopy-sim --can socketcan:vcan0 --dbc nao.dbc --lock-step --steps 2000 --json
 """,
@@ -144,6 +157,13 @@ Examples:
     type=click.IntRange(1),
     help="End after so many steps of the plant (1 s of the robot's time, with nao 10 ms).",
 )
+@click.option(
+    "--mission",
+    "timetable",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    callback=read_timetable,
+    help="What happens to the robot and when: timed events in TOML.",
+)
 @click.option("--lcm-url", default=DEFAULT_URL, show_default=True, help="Where the state goes and commands come from.")
 @click.option("--no-lcm", is_flag=True, help="Without LCM.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one line of JSON.")
@@ -157,6 +177,7 @@ def main(
     profile: str,
     seed: int,
     steps: int | None,
+    timetable: list[Event],
     lcm_url: str,
     no_lcm: bool,
     as_json: bool,
@@ -173,6 +194,7 @@ def main(
         raise click.UsageError("--time-factor is for real time: in lock-step the controller's ticks are the clock.")
     if profile == Profile.nao.name and not messages.is_whole:
         raise click.UsageError("--profile nao is for the whole robot: give --dbc examples/nao/big.dbc.")
+    _check_timetable(timetable, messages)
     robot = Robot(messages, make_plant(power, posture, Profile[profile], seed))
     # python-can logs what it also raises; one line is enough.
     logging.getLogger("can").setLevel(logging.CRITICAL)
@@ -182,7 +204,7 @@ def main(
         echo(f"canopy-sim: {error}", err=True)
         sys.exit(1)
     with bus:
-        simulation = Simulation(bus, messages, robot, steps=steps)
+        simulation = Simulation(bus, messages, robot, steps=steps, timetable=timetable)
         simulation.lcm_side = None if no_lcm else open_lcm_side(lcm_url, simulation.execute)
         mode = "lock-step" if lock_step else "real time"
         echo(f"canopy-sim: {mode} on {bus_name}", err=True)
@@ -190,6 +212,14 @@ def main(
         summary = summarise(simulation, mode, ended_by)
     echo_lines(dumps(summary) if as_json else summary_text(summary))
     sys.exit(1 if ended_by == "failure" else 0)
+
+
+def _check_timetable(timetable: list[Event], messages: RobotMessages) -> None:
+    for _, deed in timetable:
+        if deed.kind in OF_WHOLE and not messages.is_whole:
+            raise click.UsageError(
+                f"--mission has {deed.kind.name}, which is for the whole robot: give --dbc examples/nao/big.dbc."
+            )
 
 
 def _run(simulation: Simulation, lock_step: bool, time_factor: float) -> str:

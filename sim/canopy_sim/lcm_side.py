@@ -74,7 +74,7 @@ class LcmSide:
         message.stopped = state.stopped
         message.sending = state.sending
         _fill_whole(message, robot.plant)
-        message.time_ms = int(robot.plant.raw.time_ms) if robot.is_whole else state.step * robot.step_ms
+        message.time_ms = robot.time_ms
         self._send(CHANNEL_ROBOT, message)
 
     def tell(self, event: Event) -> None:

@@ -25,6 +25,7 @@ from canopy_sim.deeds import CLOCK, Deed, Kind
 from canopy_sim.lcm_side import LcmSide
 from canopy_sim.messages import RobotMessages
 from canopy_sim.robot import Robot
+from canopy_sim.timetable import Event
 
 LONGEST_WAIT = 0.05
 """Most time in one wait for a frame [s]: how soon a signal or an LCM command is seen on a silent bus."""
@@ -92,6 +93,7 @@ class Simulation:
         robot: The robot.
         lcm_side: None: without LCM.
         steps: End after so many steps of the plant; None: only stop() ends it.
+        timetable: What happens to the robot at which time of its clock, the earliest first.
     """
 
     bus: can.BusABC
@@ -99,6 +101,7 @@ class Simulation:
     robot: Robot
     lcm_side: LcmSide | None = None
     steps: int | None = None
+    timetable: list[Event] = field(default_factory=list)
     sent: int = 0
     dropped: int = 0
     """Frames that found the bus's transmit buffer full."""
@@ -150,8 +153,10 @@ class Simulation:
     def _stands(self) -> bool:
         return self.paused and self.allowed == 0
 
-    def _count_step(self) -> None:
+    def _after_step(self) -> None:
         self.allowed -= self.allowed > 0
+        while self.timetable and self.timetable[0][0] <= self.robot.time_ms:
+            self.robot.execute(self.timetable.pop(0)[1])
 
     def run_lock_step(self) -> None:
         """Runs until stop(), or the last step.
@@ -169,7 +174,7 @@ class Simulation:
             self._publish()
             if self._await_tick(time.monotonic() + REPEAT_AFTER):
                 self.robot.lock_step(time.monotonic())
-                self._count_step()
+                self._after_step()
                 number += 1
                 silent = 0
             elif not self._ended:
@@ -225,7 +230,7 @@ class Simulation:
             if self._stands or self._ended:
                 return
             self.robot.real_time_step(now)
-            self._count_step()
+            self._after_step()
 
     def _sender(self, name: str) -> Callable[[float], None]:
         def send(_now: float) -> None:

@@ -127,6 +127,11 @@ class Robot:
         """Length of a step in the robot's time [ms]."""
         return self.plant.step_ms if self.is_whole else POSTURE_STEP_MS
 
+    @property
+    def time_ms(self) -> int:
+        """The robot's clock [ms]; of a small robot that of its posture part."""
+        return int(self.plant.raw.time_ms) if self.is_whole else self.steps * POSTURE_STEP_MS
+
     def receive(self, frame: can.Message, now: float) -> bool:
         """Takes one frame from the bus; whatever is wrong with it changes a counter only.
 
