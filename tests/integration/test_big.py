@@ -9,7 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from canopy.cli import main
 from canopy.trace import Status
 from canopy_sim.mission import Mission, People
 from canopy_sim.plant import Plant, Profile, Wish
@@ -171,6 +173,18 @@ def test_an_hour_takes_a_third_of_a_second(build_dir: Path) -> None:
         mission.run(360_000)
         took.append(time.process_time() - begin)
     assert min(took) < limit
+
+
+@pytest.mark.parametrize("model", ["big", "big_power"])
+def test_what_the_corrected_tree_promises_is_proven(model: str) -> None:
+    """Whoever lies or sits gets up and plays, and gets to the charger."""
+    nao = Path(__file__).resolve().parents[2] / "examples" / "nao"
+    arguments = ["verify", str(nao / "trees" / "big.xml"), "--model", str(nao / "trees" / f"{model}.plant.toml")]
+    arguments += ["--dbc", str(nao / "big.dbc"), "--node", "Controller", "--include", "big_state.h"]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    assert result.output.count("proven ") == 1
+    assert "refuted " in result.output
 
 
 def test_missions_at_once_are_their_own(build_dir: Path) -> None:
