@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage figures golden fuzz proof test-logic test-portable
+.PHONY: coverage figures golden fuzz proof test-logic test-portable test-trace
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -92,10 +92,19 @@ test-differential: # 20,000 random trees against the model and BehaviorTree.CPP,
 	$(call BUILD,host)
 	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
 
+test-trace: # a million ticks of the trace with losses, for both decoders; in CI 20,000 and 30,000
+	$(call BUILD,host)
+	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} $(PYTEST) --timeout 3600 tests/integration/test_trace.py tests/integration/test_trace_decoders.py
+
 test-logic: # canopy verify --never and --always: circuits, and what berkeley-abc says of them
 	$(SETUP)/ensure-packages logic
 	$(SETUP)/make-venv can,lcm,test,verify,differential
 	$(PYTEST) -m logic tests/logic
+
+test-trace: # the trace with losses: a million ticks for each way to lose frames, and a million in both decoders
+	$(call BUILD,host)
+	seed=$${CANOPY_SEED:-$$(date +%s)}; build/host/tests/trace/trace_trial 7000000 $$seed && \
+	CANOPY_TRACE_TICKS=1000000 CANOPY_SEED=$$seed $(PYTEST) -s tests/integration/test_trace_decoders.py
 
 test-asan:
 	$(call BUILD,asan)

@@ -66,8 +66,6 @@ static int send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
     return 1;
 }
 
-static const canopy_trace_id_t off = {.id = CANOPY_TRACE_OFF};
-
 canopy_error_t canopy_in_process_init(canopy_in_process_t *self, const canopy_app_t *app,
                                       canopy_in_process_sensor_t *sensors, uint16_t count, const canopy_world_t *world,
                                       bool with_trace)
@@ -80,17 +78,7 @@ canopy_error_t canopy_in_process_init(canopy_in_process_t *self, const canopy_ap
     for (uint16_t index = 0; index < app->bus->rx_count; index++) {
         sensors[index] = (canopy_in_process_sensor_t){0};
     }
-    self->no_trace = (canopy_trace_config_t){.tick = off,
-                                             .inputs = off,
-                                             .arrivals = off,
-                                             .change = off,
-                                             .snapshot = off,
-                                             .health = off,
-                                             .model = off,
-                                             .health_every = 1,
-                                             .model_every = 1,
-                                             .changes_max = 1};
-    self->app.trace = &self->no_trace;
+    self->app.trace = NULL;
     self->can = (canopy_can_t){.context = self, .receive = receive, .send = send, .is_filtered = true};
     self->clock = (canopy_clock_t){.context = self, .now = virtual_now, .wait_until = never_wait};
     self->config = (canopy_loop_config_t){.app = with_trace ? app : &self->app,
@@ -137,13 +125,13 @@ void canopy_in_process_hold(canopy_in_process_t *self, uint16_t message, bool is
     }
 }
 
-/** What each node is, or was before its parent reset it: a bit a status. */
+/** What each node has returned last: a bit a status. */
 static void note_seen(const canopy_in_process_t *self)
 {
     const canopy_tree_instance_t *tree = self->app.tree_instance;
 
     for (uint16_t node = 0; node < tree->tree->node_count; node++) {
-        self->seen[node] = (uint8_t)(self->seen[node] | (1u << (tree->status[node] & ~CANOPY_STATUS_WAS)));
+        self->seen[node] = (uint8_t)(self->seen[node] | (1u << (unsigned)canopy_status_last(tree->status[node])));
     }
 }
 

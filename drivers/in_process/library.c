@@ -151,6 +151,17 @@ const uint8_t *canopy_library_statuses(void)
     return CANOPY_APP.status;
 }
 
+/** What a node is; `last`: what it returned last, whether it was reset or not. */
+int canopy_library_status(uint32_t node, bool last)
+{
+    const canopy_tree_instance_t *tree = CANOPY_APP.tree_instance;
+
+    if (node >= tree->tree->node_count) {
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    return (int)(last ? canopy_status_last(tree->status[node]) : canopy_status_now(tree->status[node]));
+}
+
 void canopy_library_halt(void)
 {
     canopy_tree_halt(CANOPY_APP.tree_instance);

@@ -29,6 +29,7 @@ int canopy_library_set_now(uint64_t now);
 uint32_t canopy_library_faults(void);
 uint32_t canopy_library_rejected(void);
 const uint8_t *canopy_library_statuses(void);
+int canopy_library_status(uint32_t node, bool last);
 void canopy_library_halt(void);
 void canopy_library_watch(uint8_t *seen);
 int canopy_library_run_image(const uint8_t *bytes, size_t size);

@@ -14,13 +14,14 @@ import can
 import click
 
 from canopy.canbus import CanBusError, open_bus, split_spec
+from canopy.compiler.cli import HexNumber
 from canopy.compiler.errors import CompileError
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
 from canopy_sim.deeds import OF_WHOLE
 from canopy_sim.lcm_side import open_lcm_side
-from canopy_sim.messages import DescriptionError, RobotMessages, load_messages
+from canopy_sim.messages import DEFAULT_TRACE, DescriptionError, RobotMessages, load_messages
 from canopy_sim.plant import Plant, Profile
 from canopy_sim.process import FASTEST, BusGoneError, Simulation
 from canopy_sim.robot import Robot
@@ -70,12 +71,12 @@ class Pair(click.ParamType[tuple[int, int]]):
         return steps[0], steps[1]
 
 
-def read_dbc(_ctx: click.Context, _param: click.Parameter, value: Path) -> RobotMessages:
-    """Reads the DBC while the command line is read, so that a wrong one ends like a wrong option."""
+def read_dbc(path: Path, trace: int) -> RobotMessages:
+    """Reads the DBC; a wrong one ends like a wrong option."""
     try:
-        return load_messages(value)
+        return load_messages(path, trace)
     except DescriptionError as error:
-        raise click.BadParameter(str(error)) from error
+        raise click.BadParameter(str(error), param_hint="'--dbc'") from error
 
 
 def read_timetable(_ctx: click.Context, _param: click.Parameter, value: Path | None) -> list[Event]:
@@ -122,11 +123,17 @@ Examples:
 )
 @click.option(
     "--dbc",
-    "messages",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    callback=read_dbc,
     required=True,
     help="The bus description: examples/nao/nao.dbc for Examples 4 and 5, big.dbc for the whole robot.",
+)
+@click.option(
+    "--trace",
+    type=HexNumber(0, 0x1FFFFFF8),
+    metavar="ID",
+    default=f"0x{DEFAULT_TRACE:X}",
+    show_default=True,
+    help="Where the controller's trace begins, as it was built (TRACE, --trace): its CanopyTick ends a lock-step.",
 )
 @click.option("--lock-step", is_flag=True, help="One step of the plant for each tick of the controller.")
 @click.option(
@@ -169,7 +176,8 @@ Examples:
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one line of JSON.")
 def main(
     bus_name: str,
-    messages: RobotMessages,
+    dbc: Path,
+    trace: int,
     lock_step: bool,
     time_factor: float | None,
     power: tuple[int, int] | None,
@@ -192,6 +200,7 @@ def main(
     """
     if lock_step and time_factor is not None:
         raise click.UsageError("--time-factor is for real time: in lock-step the controller's ticks are the clock.")
+    messages = read_dbc(dbc, trace)
     if profile == Profile.nao.name and not messages.is_whole:
         raise click.UsageError("--profile nao is for the whole robot: give --dbc examples/nao/big.dbc.")
     _check_timetable(timetable, messages)

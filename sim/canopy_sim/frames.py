@@ -20,7 +20,7 @@ from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
 from canopy_sim.e2e import Checker, Protector
 
-REFUSALS = ("flags", "length", "crc", "repeated", "sequence", "range")
+REFUSALS = ("flags", "length", "crc", "repeated", "sequence", "range", "version")
 """Why a frame is refused, in the order of the checks."""
 
 E2E_SIGNALS = {"E2E_CRC", "E2E_Counter"}

@@ -108,9 +108,9 @@ class Robot:
         self.accepted = 0
         self.refused: Counter[str] = Counter(dict.fromkeys(REFUSALS, 0))
         self.ignored = 0
-        """Frames of the DBC that the robot has no use for."""
+        """Frames of the DBC and of the trace that the robot has no use for."""
         self.unknown = 0
-        """Frames with an id that the DBC does not have."""
+        """Frames with other ids."""
         self.error_frames = 0
 
     @staticmethod
@@ -153,7 +153,7 @@ class Robot:
         if taker is not None:
             taker(frame, now)
         elif frame.arbitration_id == self._messages.tick.arbitration_id:
-            self._messages.tick.unpack(frame)
+            self._messages.tick.check(frame)
             is_tick = True
         else:
             known = frame.arbitration_id in self._messages.known_ids

@@ -14,7 +14,8 @@ import cantools
 from cantools.database.can import Database
 
 from canopy.canbus import open_bus
-from canopy.trace import Status, TraceDecoder
+from canopy.live.codes import Status, last_result
+from canopy.trace import TraceDecoder
 from canopy_sim.plant import Wish
 from integration.big_mission import below, folder, leaves, play, read_model
 from integration.lcm_netns import LcmNetwork
@@ -43,6 +44,7 @@ class Processes:
         database = cantools.database.load_file(BIG_DBC)
         assert isinstance(database, Database)
         self._database = database
+        self._known = {message.frame_id for message in database.messages}
         self._network = network
         self._factor = factor
         self._values: dict[str, dict[str, Any]] = {}
@@ -58,8 +60,12 @@ class Processes:
         data = bytes(frame.data)
         for view in self.trace.feed(frame.arbitration_id, data):
             self.reached |= {
-                index for index, code in enumerate(view.statuses) if code not in (Status.UNKNOWN, Status.IDLE)
+                index
+                for index, node in enumerate(view.nodes)
+                if node.code >= 0 and last_result(node.code) is not Status.IDLE
             }
+        if frame.arbitration_id not in self._known:  # the trace
+            return
         message = self._database.get_message_by_frame_id(frame.arbitration_id)
         self._values[message.name] = dict(message.decode_simple(data))
         self._shown |= {(f"{message.name}.{name}", str(value)) for name, value in self._values[message.name].items()}

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from canopy.cli import main
-from canopy.trace import Status
+from canopy.live.codes import Status
 from canopy_sim.mission import Mission, People
 from canopy_sim.plant import Plant, Profile, Wish
 from integration.big_mission import InProcess, below, folder, leaves, model_file, play

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from canopy.inprocess import Application, InProcessError
-from canopy.trace import Status
+from canopy.live.codes import Status
 from canopy_sim.plant import Profile
 from integration import paper
 from integration.big_mission import model_file

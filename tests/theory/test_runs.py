@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from canopy.trace import Status
+from canopy.live.codes import Status
 from canopy.verify.claims import Result
 from canopy.verify.run import verify
 from canopy_sim.small_mission import SmallMission

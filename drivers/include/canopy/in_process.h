@@ -53,8 +53,7 @@ struct canopy_in_process {
     canopy_status_t root; /**< Of the last tick. */
     bool has_ended;       /**< The world's last step said so. */
     canopy_loop_t loop;
-    canopy_app_t app; /* the application's, with `no_trace`: what runs where none is wanted */
-    canopy_trace_config_t no_trace;
+    canopy_app_t app; /* the application's without a trace: what runs where none is wanted */
     canopy_can_t can;
     canopy_clock_t clock;
     canopy_loop_config_t config;

@@ -14,9 +14,9 @@ from cantools.database.can import Message, Signal
 from canopy.compiler.errors import nearest
 from canopy.files import FileError, read_bytes
 from canopy.inprocess.library import DATA_MAX, NONE, EntryPlace, InProcessError, Library
+from canopy.live.codes import Status
 from canopy.model import ModelError, load_model
 from canopy.signals import load_database, message_attribute
-from canopy.trace import Status
 
 Value = int | float | str | Fraction
 
@@ -112,7 +112,7 @@ class Application:
             if message.name in self.model.receive:
                 place = call["receives"](message.frame_id, message.is_extended_frame)
                 self._inputs[message.name] = _Input(message, self._known(place, message))
-            if message.name in self.model.send and message.name not in self.model.trace:
+            if message.name in self.model.send:
                 place = call["sends"](message.frame_id, message.is_extended_frame)
                 self._outputs[message.name] = (message, self._known(place, message))
         self._entries = {entry.name: entry for entry in self.library.entries()}
@@ -208,7 +208,7 @@ class Application:
     def seen(self, node: str | int) -> frozenset[Status]:
         """Every status that a node has had after a tick since watch(), also where its parent has reset it."""
         bits = self.library.seen()[self.index(node)]
-        return frozenset(status for status in Status if 0 <= status < Status.PREVIOUSLY and bits >> status & 1)
+        return frozenset(status for status in Status if status >= 0 and bits >> status & 1)
 
     @property
     def now(self) -> float:
@@ -319,12 +319,11 @@ class Application:
         Raises:
             InProcessError: No node has the name, or several have.
         """
-        code = self.library.statuses()[self.index(node)]
-        return Status.IDLE if code & Status.PREVIOUSLY else Status(code)
+        return Status(self.library.call["status"](self.index(node), False))
 
     def last_status(self, node: str | int) -> Status:
         """As status(), but of a node that its parent has reset what it returned before: RUNNING when it was halted."""
-        return Status(self.library.statuses()[self.index(node)] & ~Status.PREVIOUSLY)
+        return Status(self.library.call["status"](self.index(node), True))
 
     def index(self, node: str | int) -> int:
         """The index of a node. Raises InProcessError: no node has the name, or several have."""

@@ -72,6 +72,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "faults": (_U32, ()),
     "rejected": (_U32, ()),
     "statuses": (ctypes.c_void_p, ()),
+    "status": (_INT, (_U32, _BOOL)),
     "halt": (None, ()),
     "watch": (None, (ctypes.c_void_p,)),
     "run_image": (_INT, (_BYTES, ctypes.c_size_t)),
@@ -140,7 +141,7 @@ class Library:
         return found
 
     def statuses(self) -> bytes:
-        """The status code of every node now, in depth-first order."""
+        """A byte per node, as the engine keeps its status (canopy/status_code.h), in depth-first order."""
         return bytes(self._statuses)
 
     def watch(self) -> None:

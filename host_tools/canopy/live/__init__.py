@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Watching and telling what runs: over LCM and CAN."""
+"""A controller as its bus shows it, live or from a log: the parts of which `canopy.trace` is made."""

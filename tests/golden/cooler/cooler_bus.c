@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xd621f7e7e48847ceu
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xd408447158e41e57u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x7dc8c93072e734d2u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf24ce6dbcd4bc156u
 #error "files of two runs of canopy: generate them again"
 #endif
 
