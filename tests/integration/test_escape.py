@@ -208,6 +208,7 @@ def test_the_places_that_mark_text_as_c_are_known() -> None:
         "compiler/row_c.py": 2,
         "compiler/script_bodies.py": 1,
         "compiler/stubs.py": 1,
+        "compiler/trace.py": 2,
         "escape/c.py": 13,
         "escape/c_templates.py": 4,
     }
