@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xf24ce6dbcd4bc156u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xdecde70fb8c2f0cau
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xa5afc0e030277a1bu
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x8549f5d21e505926u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xa5afc0e030277a1bu
+#if CANOPY_GENERATED_ROOM_APP_H != 0x8549f5d21e505926u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xa5afc0e030277a1bu
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x8549f5d21e505926u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -120,7 +120,7 @@ const canopy_app_t room_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = ROOM_NODES,
 };
 #ifdef CANOPY_IN_PROCESS
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xa5afc0e030277a1bu
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x8549f5d21e505926u
 #error "files of two runs of canopy: generate them again"
 #endif
 
