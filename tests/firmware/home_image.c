@@ -45,7 +45,8 @@ int main(void)
     canopy_status_t root = CANOPY_RUNNING;
     int failures = 0;
 
-    if (nao_in_process_init(&run, &nao_home_app) != CANOPY_OK || !canopy_sim_posture_set(&run.nao.robot.posture, 500, 0)) {
+    if (nao_in_process_init(&run, &nao_home_app) != CANOPY_OK ||
+        !canopy_sim_posture_set(&run.nao.robot.posture, 500, 0)) {
         semihosting_put("The set-up failed.\n");
         return 1;
     }
