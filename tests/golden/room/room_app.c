@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x8549f5d21e505926u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x8549f5d21e505926u
+#if CANOPY_GENERATED_ROOM_APP_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x8549f5d21e505926u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -110,6 +110,7 @@ const canopy_app_t room_app = {
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 0u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = (uint8_t *)memory.status,
