@@ -28,7 +28,9 @@ from canopy.compiler.image_room import exchangeable, image_cost, make_room
 from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
+    entry_kind,
     entry_note,
+    entry_step,
     entry_type,
     function_names,
     has_setter,
@@ -262,6 +264,8 @@ def environment(bus: Bus) -> jinja2.Environment:
         "has_setter": has_setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
+        "entry_kind": entry_kind,
+        "entry_step": entry_step,
         "item_type": item_type,
         "text_constants": text_constants,
         "reason_constants": reason_constants,
