@@ -24,6 +24,7 @@ SUBCOMMANDS = {
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
+    "sim": ("canopy.live.robot_command", "Tell the simulated robot something."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "record": ("canopy.record", "Record a bus to a log that can be replayed."),
     "replay": ("canopy.replay.cli", "Run the program again on a log, and compare it bit for bit."),

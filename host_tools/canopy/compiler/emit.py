@@ -17,7 +17,7 @@ from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.bounds import Others
-from canopy.compiler.budget import Budget, make_budget, trace_capacity
+from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import Bus, read_bus
 from canopy.compiler.bus_timing import frame_us, frames_in
 from canopy.compiler.dbc_file import read_dbc
@@ -28,7 +28,9 @@ from canopy.compiler.image_room import exchangeable, image_cost, make_room
 from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
+    entry_kind,
     entry_note,
+    entry_step,
     entry_type,
     function_names,
     has_setter,
@@ -92,8 +94,8 @@ class Application:
 
     @property
     def trace_capacity(self) -> int:
-        """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-        return trace_capacity(self.trace)
+        """Trace frames that can wait: a power of two."""
+        return self.trace.capacity if self.trace is not None else 1
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:
@@ -262,6 +264,8 @@ def environment(bus: Bus) -> jinja2.Environment:
         "has_setter": has_setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
+        "entry_kind": entry_kind,
+        "entry_step": entry_step,
         "item_type": item_type,
         "text_constants": text_constants,
         "reason_constants": reason_constants,

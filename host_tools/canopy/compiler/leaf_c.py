@@ -171,3 +171,17 @@ def entry_note(entry: Entry) -> str:
     if entry.type.kind == "fixed":
         return f"; in steps of {plain(entry.type.scale)}"
     return "; place in the table of texts" if entry.type.kind == "text" else ""
+
+
+@emits_c
+def entry_kind(entry: Entry) -> str:
+    """How a host program in the same process reads the entry's member: `kind` of canopy_in_process_entry_t."""
+    kind = entry.type.kind
+    if kind in ("int", "fixed", "duration"):
+        return "i" if entry.type.low < 0 else "u"
+    return {"bool": "b", "float": "f", "text": "t"}.get(kind, "o") if not entry.type.capacity else "o"
+
+
+def entry_step(entry: Entry) -> str:
+    """The physical size of one step of the member, as a decimal number."""
+    return str(plain(entry.type.scale)) if entry.type.kind == "fixed" else "1"
