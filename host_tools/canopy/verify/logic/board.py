@@ -21,10 +21,11 @@ from canopy.compiler.errors import Place
 from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import Options
 from canopy.compiler.script.compile import guess
-from canopy.compiler.script.syntax import Assignment, Expression, Name, parse, parts
+from canopy.compiler.script.syntax import Assignment, Expression, Name, parts
 from canopy.compiler.script.values import INT64, Const
 from canopy.compiler.tree import Node, Script, Tree
 from canopy.semantics.spec import ATTRIBUTES, STATUS_NAMES, TEST_SCRIPTS
+from canopy.verify.logic.lower import statements_of
 
 NAME = "logic"
 FORMULA = Place("formula")
@@ -105,7 +106,7 @@ def speaks_of_signals(tree: Tree, nodes: Iterable[Node]) -> bool:
 def _names(script: Script) -> list[str]:
     """The names that a script uses."""
     if script.role in ("condition", "action"):
-        found = (part for statement in parse(script.text) for part in parts(statement))
+        found = (part for statement in statements_of(script) for part in parts(statement))
         return [part.name for part in found if isinstance(part, Name)]
     texts = {script.attribute: script.text}
     if script.role == "switch":
@@ -178,7 +179,7 @@ class Board:
     def read(self, script: Script) -> tuple[Expression, ...]:
         """The script's statements."""
         if id(script) not in self.statements:
-            self.statements[id(script)] = parse(script.text)
+            self.statements[id(script)] = statements_of(script)
         return self.statements[id(script)]
 
     def targets(self, script: Script) -> list[int]:
