@@ -6,7 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from canopy.compiler.blackboard import Entry, SignalName, pointer
+from canopy.compiler.script.compile import guess
 from canopy.compiler.script.syntax import Assignment, Expression
+from canopy.compiler.script.values import Const
 from canopy.compiler.script_bodies import entry_value
 from canopy.compiler.tree import Script
 from canopy.verify.logic.board import FORMULA, Board, Fact
@@ -195,6 +197,8 @@ class Scripts:
         result = []
         for attribute, text in texts.items():
             case = self._named(script, values, attribute, text)
+            if isinstance(variable, TextValue) and isinstance(guess(text), Const):
+                raise NotModelledError("a text may be the same number as a case")  # 5 and 5.0
             by_name = isinstance(variable, TextValue) or bool(variable.choices)
             if pointer(text, attribute) is None and (isinstance(variable, TextValue) or (by_name and _is_text(case))):
                 case = values.text(text)
