@@ -111,3 +111,7 @@ class Trace:
     def slots(self) -> int:
         """How many slots there are."""
         return sum(value.slots for value in self.values)
+
+
+NO_TRACE = Trace(base=0, extended=False, guard=None, ticks=0, changes_max=0, known_within_ms=0, values=(), texts=())
+"""Of an application that was built without one."""

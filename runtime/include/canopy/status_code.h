@@ -87,7 +87,8 @@ static inline canopy_status_t canopy_status_now(uint8_t stored)
 /** The status code of a node. A SKIPPED one has nothing to forget: that it was reset is not told. */
 static inline uint8_t canopy_status_code(uint8_t stored)
 {
-    unsigned last = (unsigned)canopy_status_last(stored);
+    canopy_status_t result = canopy_status_last(stored);
+    unsigned last = (unsigned)result;
     bool is_old = (stored & CANOPY_STATUS_OLD) != 0u;
 
     if (last == (unsigned)CANOPY_IDLE) {
