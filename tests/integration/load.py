@@ -15,10 +15,9 @@ from pathlib import Path
 
 from canopy.compiler.bounds import Others, make_bounds
 from canopy.compiler.bus_reader import read_bus
-from canopy.compiler.bus_timing import trace_frames
 
 DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
-PERIOD_MS, BITRATE, BURST, LATENCY_US, CHANGES_MAX = 50, 500_000, 10, 50, 2
+PERIOD_MS, BITRATE, BURST, LATENCY_US, TRACE_FRAMES = 50, 500_000, 10, 50, 12
 TIMEOUT_US = 500_000
 LOADS = (0, 30, 60, 90)
 CUTS = 3
@@ -60,7 +59,7 @@ def bounds_at(load: int) -> Bounds:
     """The compiler's bounds for nao_power's Battery and PowerCommand."""
     bus = read_bus(DBC, "Controller", PERIOD_MS)
     others = Others(load, BURST if load else 0, LATENCY_US)
-    bounds = make_bounds(bus, BITRATE, others, trace_frames(bus, CHANGES_MAX))
+    bounds = make_bounds(bus, BITRATE, others, TRACE_FRAMES)
     age = next(bound.age_us for bound in bounds.inputs if bound.name == "Battery")
     safe = next(bound.safe_us for bound in bounds.outputs if bound.name == "PowerCommand")
     assert age is not None
