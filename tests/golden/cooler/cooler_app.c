@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xf812b5b6170beff9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_APP_H != 0xf812b5b6170beff9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xf812b5b6170beff9u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -267,5 +267,5 @@ const canopy_app_t cooler_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = COOLER_NODES,
 };

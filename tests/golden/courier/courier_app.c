@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x4a2877d0cfbba0b3u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_APP_H != 0x4a2877d0cfbba0b3u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x4a2877d0cfbba0b3u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -562,7 +562,7 @@ const canopy_app_t courier_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 16u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = COURIER_NODES,
     .trace_state = &memory.trace,
     .sent = (uint8_t *)memory.sent,
     .told = NULL,

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x4a2877d0cfbba0b3u
 #error "files of two runs of canopy: generate them again"
 #endif
 

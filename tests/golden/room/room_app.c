@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x2bc3b7f3a39d2b46u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_APP_H != 0x2bc3b7f3a39d2b46u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x2bc3b7f3a39d2b46u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -120,5 +120,5 @@ const canopy_app_t room_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = ROOM_NODES,
 };

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x2bc3b7f3a39d2b46u
 #error "files of two runs of canopy: generate them again"
 #endif
 
