@@ -24,6 +24,7 @@ LINE_MAX = 2**31 - 1
 DATA_ID_MAX = 0xFFFF
 SLOTS_MAX = 4096
 CHANGES_MAX = 32
+TICKS_MAX = 1_000
 KNOWN_MS_MAX = 2**53
 
 T = TypeVar("T")
@@ -204,6 +205,7 @@ class _Reader:
             base=self._number(trace, where, "base", 0, (2**29 if extended else 2**11) - len(MESSAGES)),
             extended=extended,
             guard=guard,
+            ticks=self._number(trace, where, "ticks", 1, TICKS_MAX),
             changes_max=self._number(trace, where, "changes_max", 1, CHANGES_MAX),
             known_within_ms=self._number(trace, where, "known_within_ms", 0, KNOWN_MS_MAX),
             values=values,

@@ -15,12 +15,12 @@ from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
-from canopy.compiler.limits import BITRATE, PERIOD_MS, Limits
+from canopy.compiler.limits import BITRATE, PERIOD_MS, TRACE_TICKS, Limits
 from canopy.compiler.names import is_c_identifier
 from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs
-from canopy.compiler.trace import Entries, Trace, TraceOptions
+from canopy.compiler.trace import TICKS_DEFAULT, Entries, Trace, TraceOptions
 from canopy.escape import c
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo
@@ -39,7 +39,7 @@ def _print_trace(budget: Budget, trace: Trace) -> None:
     idle, worst = budget.trace_load_percent or (0.0, 0.0)
     values = f", {len(trace.values)} values" if trace.values else ""
     load = f"{idle:6.2f} % of the bus while nothing changes, {worst:.2f} % at most"
-    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM")
+    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM, room for {trace.ticks} ticks without a bus")
     echo(f"         {trace.nodes} nodes{values}, all known within {trace.known_within_ms} ms")
 
 
@@ -135,7 +135,7 @@ class HexNumber(click.ParamType[int]):
         return number
 
 
-def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOptions | None:
+def _trace(base: int | None, guard: int | None, entries: Entries, ticks: int) -> TraceOptions | None:
     if base is None:
         if guard is not None or entries != "all":
             raise CompileError(
@@ -144,7 +144,7 @@ def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOption
                 "for example --trace 0x600",
             )
         return None
-    return TraceOptions(base, guard, entries)
+    return TraceOptions(base, guard, entries, ticks)
 
 
 def in_range(limits: Limits) -> click.IntRange:
@@ -251,6 +251,13 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
 @click.option(
     "--trace-guard", type=HexNumber(0, 0xFFFF), metavar="DATA_ID", help="Protect CanopyTick by E2E Profile 11."
 )
+@click.option(
+    "--trace-ticks",
+    default=TICKS_DEFAULT,
+    show_default=True,
+    type=in_range(TRACE_TICKS),
+    help="Keep the trace of so many ticks while the bus lets nothing through.",
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -279,6 +286,7 @@ def command(
     trace_base: int | None,
     trace_entries: Entries,
     trace_guard: int | None,
+    trace_ticks: int,
     max_ram: int | None,
     max_flash: int | None,
     costs: bool,
@@ -298,7 +306,7 @@ def command(
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         images = _images(image_nodes, image_uses)
         others = Others(foreign_load, foreign_burst, tx_latency_us)
-        trace = _trace(trace_base, trace_guard, trace_entries)
+        trace = _trace(trace_base, trace_guard, trace_entries, trace_ticks)
         application = load_application(
             name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others, trace
         )

@@ -17,7 +17,7 @@ from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.bounds import Others
-from canopy.compiler.budget import Budget, make_budget, trace_capacity
+from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import Bus, read_bus
 from canopy.compiler.bus_timing import frame_us, frames_in
 from canopy.compiler.dbc_file import read_dbc
@@ -88,8 +88,8 @@ class Application:
 
     @property
     def trace_capacity(self) -> int:
-        """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-        return trace_capacity(self.trace)
+        """Trace frames that can wait: a power of two."""
+        return self.trace.capacity if self.trace is not None else 1
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:
