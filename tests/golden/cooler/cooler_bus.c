@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xf812b5b6170beff9u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x703ee4ebc761a514u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x2bc3b7f3a39d2b46u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x2bc3b7f3a39d2b46u
+#if CANOPY_GENERATED_ROOM_APP_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x2bc3b7f3a39d2b46u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -110,6 +110,7 @@ const canopy_app_t room_app = {
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 0u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = (uint8_t *)memory.status,

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x2bc3b7f3a39d2b46u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x4b6a84ed7b51a010u
 #error "files of two runs of canopy: generate them again"
 #endif
 
