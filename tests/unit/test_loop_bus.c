@@ -365,6 +365,7 @@ static uint32_t trace_lost_after(unsigned ticks)
 {
     canopy_tx_counters_t counters;
 
+    boxes_reset();
     app.trace = &trace;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
     for (unsigned tick = 0; tick < ticks; tick++) {

@@ -41,7 +41,9 @@ def struct_size(members: Iterable[tuple[int, int]]) -> tuple[int, int]:
 
 
 def scalar(c_type: str) -> tuple[int, int]:
-    """(size, alignment) of a scalar type."""
+    """(size, alignment) of a scalar type, or of a value of any type."""
+    if c_type == "canopy_value_t":
+        return struct_size([(4, 4), (8, 8), (8, 8), (4, 4)])
     return SIZES[c_type], SIZES[c_type]
 
 

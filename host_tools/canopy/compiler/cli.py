@@ -17,8 +17,8 @@ from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
 from canopy.compiler.limits import BITRATE, PERIOD_MS, TRACE_TICKS, Limits
 from canopy.compiler.names import is_c_identifier
-from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
-from canopy.compiler.port_types import Options, is_fixed_point
+from canopy.compiler.output import INPUT_ERROR, dependencies, fail, print_note, write_or_exit
+from canopy.compiler.port_types import Options, is_fixed_point, is_queue
 from canopy.compiler.stubs import stubs
 from canopy.compiler.trace import TICKS_DEFAULT, Entries, Trace, TraceOptions
 from canopy.escape import c
@@ -92,11 +92,43 @@ main_tree_option = click.option(
 )
 
 
+def _keep(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> None:
+    """Keeps an option that all commands over trees have, and that only read_type_options() asks for."""
+    context.meta[f"canopy.{parameter.name}"] = value
+
+
+def _kept(name: str) -> tuple[str, ...]:
+    context = click.get_current_context(silent=True)
+    return context.meta.get(f"canopy.{name}", ()) if context is not None else ()
+
+
+foreign_option = click.option(
+    "--foreign",
+    multiple=True,
+    metavar="NAME",
+    expose_value=False,
+    callback=_keep,
+    help="An attribute or metadata key of another tool that looks like a misspelt one of Canopy's.",
+)
+
+
+search_option = click.option(
+    "--search",
+    multiple=True,
+    metavar="PATH",
+    expose_value=False,
+    callback=_keep,
+    help="A folder, a Groot2 project or a file with trees and models that TREE does not include.",
+)
+
+
 def type_options(command: _Command) -> _Command:
     """The options about types and includes, of the commands that look into ports and scripts."""
     for option in (
         main_tree_option,
         package_option,
+        search_option,
+        foreign_option,
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
             "--allow-unset-ports",
@@ -167,6 +199,19 @@ def read_packages(packages: tuple[str, ...]) -> dict[str, Path]:
     return folders
 
 
+def read_search() -> tuple[Path, ...]:
+    """What `search_option` was given.
+
+    Raises:
+        CompileError: there is nothing at a path.
+    """
+    places = tuple(Path(place) for place in _kept("search"))
+    for place in places:
+        if not place.exists():
+            raise CompileError(Place(f"--search {place}"), "is not there", "a folder, a .btproj, or a tree file")
+    return places
+
+
 def read_type_options(
     include: str | None,
     floats: bool,
@@ -183,7 +228,7 @@ def read_type_options(
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type) or is_queue(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
     if include is not None:
@@ -191,7 +236,16 @@ def read_type_options(
             c.header(include)
         except ValueError as error:
             raise CompileError(Place("--include"), str(error)) from error
-    return Options(floats, result, include, read_packages(packages), unset_ports, main_tree)
+    return Options(
+        floats,
+        result,
+        include,
+        read_packages(packages),
+        unset_ports,
+        main_tree,
+        search=read_search(),
+        foreign=frozenset(_kept("foreign")),
+    )
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
@@ -330,6 +384,7 @@ def command(
             echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
     write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
+    print_note(application.table.tree.foreign.note())
     if as_json:
         echo(dumps(budget.as_dict()))
     else:

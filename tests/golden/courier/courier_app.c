@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x7b65a450679825e4u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x7b65a450679825e4u
+#if CANOPY_GENERATED_COURIER_APP_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x7b65a450679825e4u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -568,3 +568,32 @@ const canopy_app_t courier_app = {
     .sent = (uint8_t *)memory.sent,
     .told = NULL,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = "goal",
+     .type = "pose_t",
+     .step = "1",
+     .size = sizeof memory.entries.goal,
+     .address = &memory.entries.goal,
+     .kind = 'o'},
+    {.name = "path",
+     .type = "path_t",
+     .step = "1",
+     .size = sizeof memory.entries.path,
+     .address = &memory.entries.path,
+     .kind = 'o'},
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 2u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif

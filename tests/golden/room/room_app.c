@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x4b6a84ed7b51a010u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x4b6a84ed7b51a010u
+#if CANOPY_GENERATED_ROOM_APP_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x4b6a84ed7b51a010u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -123,3 +123,20 @@ const canopy_app_t room_app = {
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
     .nodes_max = ROOM_NODES,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 0u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif
