@@ -187,7 +187,9 @@ class _Reader:
     def _trace(self, data: dict[str, Any]) -> Trace:
         if "trace" in data and data["trace"] is None:
             if not self._traced:
-                return Trace(base=0, extended=False, guard=None, changes_max=1, known_within_ms=0, values=(), texts=())
+                return Trace(
+                    base=0, extended=False, guard=None, ticks=1, changes_max=1, known_within_ms=0, values=(), texts=()
+                )
             raise self._error(
                 "trace",
                 "is null: the application was built without a trace, so nothing can be watched; build it with "
