@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from canopy.cli import main
 
+pytestmark = pytest.mark.logic
 MODEL = (
     '<TreeNodesModel><Action ID="A"/><Action ID="B"/>'
     '<Enum ID="Color"><value name="RED"/><value name="GREEN"/></Enum></TreeNodesModel>'
@@ -25,7 +26,7 @@ SWITCH = '<Switch2 variable="{t}" case_1="5.0" case_2="x"><A/><AlwaysSuccess/><A
         ('<Script code="a := 1; b := 0"/><A _skipIf="a == 1 || b == 1 &amp;&amp; b == 0"/>', "SKIPPED(A)", "refuted"),
         ("<Script code=\"t := 'b'\"/><A _skipIf=\"t &lt; 'a'\"/>", "SKIPPED(A)", "unknown"),
         (f"<Script code=\"t := '5'\"/>{SWITCH}", "TICKED(A)", "unknown"),
-        ('<Script code="a := b := 1"/><A/>', "SKIPPED(A)", "not modelled"),
+        ('<Script code="a := b := 1"/><A/>', "SKIPPED(A)", "proven"),
     ],
 )
 def test_the_answer_is_right_or_none(tmp_path: Path, nodes: str, formula: str, word: str) -> None:

@@ -94,7 +94,7 @@ class Trace:
 
     @property
     def waits_periods(self) -> int:
-        """Periods after its tick in which a frame can still leave: CANOPY_TRACE_PERIODS, and those that there is room for."""
+        """So long after its tick a frame can leave: CANOPY_TRACE_PERIODS, and those that there is room for."""
         return 4 + self.ticks
 
     @cached_property
