@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import can
-from cantools.database.can import Database, Message, Signal
+from cantools.database.can import Signal
 
-from canopy.compiler.dbc_file import load_dbc
-from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
+from canopy.bus.cantools_view import cantools_message
+from canopy.bus.source import SourceMessage, SourceSignal
+from canopy.compiler.dbc_file import Dbc, attribute, load_dbc
+from canopy.compiler.errors import CompileError
+from canopy.compiler.limits import DATA_ID, RAW, TIME_MS
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.plant import PostureMode, PowerMode
 
@@ -48,19 +50,13 @@ _LIMITS = {
 }
 
 
-def _attribute(database: Database, owner: Message | Signal, name: str, otherwise: int) -> int:
-    """An integer attribute of a message or signal, else its default in the DBC, else `otherwise`."""
-    value = None
-    if owner.dbc is not None and name in owner.dbc.attributes:
-        value = owner.dbc.attributes[name].value
-    elif database.dbc is not None and name in database.dbc.attribute_definitions:
-        value = database.dbc.attribute_definitions[name].default_value
-    if value is None:
-        return otherwise
+def _attribute(dbc: Dbc, name: str, otherwise: int, message: SourceMessage, signal: SourceSignal | None = None) -> int:
+    """A whole number that the DBC or its overlay gives a message or signal, else `otherwise`."""
     try:
-        return whole(value, _LIMITS[name], f"{name} of {owner.name}", Place(""))
+        value = attribute(dbc, name, _LIMITS[name], message, signal)
     except CompileError as error:
         raise DescriptionError(error.message) from None
+    return otherwise if value is None else value
 
 
 def _exact(number: float | None) -> Fraction:
@@ -71,16 +67,17 @@ def _exact(number: float | None) -> Fraction:
 class _FrameLayout:
     """What both directions need of a message."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         try:
-            self._message = database.get_message_by_name(name)
-        except KeyError:
-            raise DescriptionError(f"no message {name}") from None
+            self._written = dbc.message(name)
+        except CompileError as error:
+            raise DescriptionError(error.message) from None
+        self._message = cantools_message(self._written)
         self.name = name
         self.arbitration_id: int = self._message.frame_id
-        self.cycle = _attribute(database, self._message, "GenMsgCycleTime", 0) / 1e3
+        self.cycle = _attribute(dbc, "GenMsgCycleTime", 0, self._written) / 1e3
         """Cycle time [s]; 0: not cyclic."""
-        data_id = _attribute(database, self._message, "E2EDataId", -1)
+        data_id = _attribute(dbc, "E2EDataId", -1, self._written)
         self._data_id = None if data_id < 0 else data_id
         wanted = signals | (E2E_SIGNALS if self._data_id is not None else set())
         missing = sorted(wanted - {signal.name for signal in self._message.signals})
@@ -91,9 +88,9 @@ class _FrameLayout:
 class Outgoing(_FrameLayout):
     """A message that the robot sends."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         """`signals` are those that frame() will be given; a DescriptionError says what the DBC lacks."""
-        super().__init__(database, name, signals)
+        super().__init__(dbc, name, signals)
         self._protector = None if self._data_id is None else Protector(self._data_id)
 
     def frame(self, values: Mapping[str, Fraction | int]) -> can.Message:
@@ -126,11 +123,11 @@ class Outgoing(_FrameLayout):
 class Incoming(_FrameLayout):
     """A message that the robot obeys."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         """`signals` are those that the robot reads; a DescriptionError says what the DBC lacks."""
-        super().__init__(database, name, signals)
+        super().__init__(dbc, name, signals)
         self._checker = None if self._data_id is None else Checker(self._data_id)
-        timeout = _attribute(database, self._message, "GenMsgTimeoutTime", 0) / 1e3
+        timeout = _attribute(dbc, "GenMsgTimeoutTime", 0, self._written) / 1e3
         self.timeout: float | None = timeout or TIMEOUT_IN_CYCLES * self.cycle or None
         """How long an accepted frame stays fresh [s]; None: for ever."""
 
@@ -161,15 +158,15 @@ class Incoming(_FrameLayout):
 class CommandMessage(Incoming):
     """A command with the one signal Mode, whose value table names the plant's modes."""
 
-    def __init__(self, database: Database, name: str, modes: type[PowerMode] | type[PostureMode]) -> None:
+    def __init__(self, dbc: Dbc, name: str, modes: type[PowerMode] | type[PostureMode]) -> None:
         """`modes` are the plant's; a DescriptionError says where the DBC's table and safe value do not fit them."""
-        super().__init__(database, name, {"Mode"})
+        super().__init__(dbc, name, {"Mode"})
         signal = self._message.get_signal_by_name("Mode")
         described = {str(text): int(value) for value, text in (signal.choices or {}).items()}
         wanted = {mode.name: mode.value for mode in modes}
         if described != wanted:
             raise DescriptionError(f"values of {name}.Mode are {described}, the robot's are {wanted}")
-        safe = _attribute(database, signal, "GenSigInactiveValue", 0)
+        safe = _attribute(dbc, "GenSigInactiveValue", 0, self._written, self._written.signal("Mode"))
         if safe not in wanted.values():
             raise DescriptionError(f"GenSigInactiveValue of {name}.Mode is {safe}, which is no mode")
         self.safe_mode = safe
@@ -178,15 +175,15 @@ class CommandMessage(Incoming):
 class RobotMessages:
     """All messages of the robot."""
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, dbc: Dbc) -> None:
         """A DescriptionError says what the DBC lacks."""
-        self.battery = Outgoing(database, "Battery", {"Charging", "Level", "ChargerDistance"})
-        self.posture = Outgoing(database, "Posture", {"HeadX", "HeadHeight"})
-        self.simulation_step = Outgoing(database, "SimulationStep", {"Step"})
-        self.power_command = CommandMessage(database, "PowerCommand", PowerMode)
-        self.posture_command = CommandMessage(database, "PostureCommand", PostureMode)
-        self.tick = Incoming(database, "CanopyTick", set())
-        self.known_ids = {message.frame_id for message in database.messages}
+        self.battery = Outgoing(dbc, "Battery", {"Charging", "Level", "ChargerDistance"})
+        self.posture = Outgoing(dbc, "Posture", {"HeadX", "HeadHeight"})
+        self.simulation_step = Outgoing(dbc, "SimulationStep", {"Step"})
+        self.power_command = CommandMessage(dbc, "PowerCommand", PowerMode)
+        self.posture_command = CommandMessage(dbc, "PostureCommand", PostureMode)
+        self.tick = Incoming(dbc, "CanopyTick", set())
+        self.known_ids = {message.frame_id for message in dbc.source.messages}
         """Ids of the whole DBC."""
         for sensor in (self.battery, self.posture):
             if sensor.cycle <= 0:
@@ -200,10 +197,10 @@ def load_messages(dbc: Path) -> RobotMessages:
         DescriptionError: The file cannot be read, is no DBC, or not one of this robot.
     """
     try:
-        database: Database = load_dbc(dbc).database
+        read = load_dbc(dbc)
     except CompileError as error:
         raise DescriptionError(f"{error.place}: {error.message}") from error
     try:
-        return RobotMessages(database)
+        return RobotMessages(read)
     except DescriptionError as error:
         raise DescriptionError(f"{dbc}: {error}") from None

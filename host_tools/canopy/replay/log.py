@@ -15,12 +15,14 @@ from operator import xor
 from pathlib import Path
 
 import can
-from cantools.database.can import Message as DbcMessage
 
+from canopy.bus.decode import IdTable
+from canopy.compiler.bus_model import Message
+from canopy.compiler.bus_reader import read_messages
 from canopy.files import FileError, check_file
 from canopy.model import Model, ModelError
 from canopy.replay.ticks import Tick
-from canopy.signals import load_database, message_attribute
+from canopy.signals import load_bus
 from canopy.trace import mismatch
 from canopy.unixbus import encode
 
@@ -52,10 +54,13 @@ class Bus:
         Raises:
             ModelError: It cannot be used, or the controller does not trace what a replay needs.
         """
-        database = load_database(model)
+        bus = load_bus(model)
         self.model = model
-        self.received: dict[int, DbcMessage] = {}
-        self.sent: dict[int, DbcMessage] = {}
+        self.received: dict[int, Message] = {}
+        """By the order of the controller's table."""
+        self.senders: dict[int, str] = {}
+        """Who sends a received message, by the DBC."""
+        self.sent: dict[int, Message] = {}
         """Commands and trace."""
         self.trace: dict[int, str] = {}
         """Which kind a trace message is."""
@@ -67,21 +72,30 @@ class Bus:
                     f"{model.path}: trace: has no {need}, without which nothing can be replayed: add it to the DBC as "
                     "in docs/trace.md, build again, and record again"
                 )
-        for message in database.messages:
-            number = key(message.frame_id, message.is_extended_frame)
-            kind = message.name.partition("_")[0]
-            if model.trace.get(kind) == message.frame_id and model.bus_node in message.senders:
+        messages = {message.name: message for message in bus.messages}
+        for written in bus.source.messages:
+            number = key(written.frame_id, written.is_extended)
+            kind = written.name.partition("_")[0]
+            if model.trace.get(kind) == written.frame_id and model.bus_node in written.senders:
                 self.trace[number] = kind
-                self.sent[number] = message
-            elif message.name in model.send:
-                self.sent[number] = message
-                data_id = message_attribute(message, "E2EDataId", -1)
-                if data_id >= 0:
-                    self.protected[number] = data_id
-            elif message.name in model.receive:
-                self.received[number] = message
+                self.sent[number] = read_messages(model.dbc, only=(written.name,)).messages[0]
+            elif written.name in model.send:
+                message = self.sent[number] = messages[written.name]
+                if message.data_id is not None:
+                    self.protected[number] = message.data_id
+        for place, name in enumerate(model.receive):
+            self.received[place] = messages[name]
+            senders = bus.source.message(name).senders
+            self.senders[place] = senders[0] if senders else ""
+        self._places = {name: place for place, name in enumerate(model.receive)}
+        self._ids = IdTable(tuple(messages[name] for name in model.receive))
         if len(self.trace) != len(model.trace):
             raise ModelError(f"{model.path}: trace: {model.dbc.name} does not have these messages: build again")
+
+    def receives(self, identifier: int, extended: bool) -> int | None:
+        """The key in `received` of the message that a frame is; None: of none."""
+        found = self._ids.find(identifier, extended)
+        return None if found is None else self._places[found.name]
 
 
 @dataclass(frozen=True)
@@ -91,7 +105,7 @@ class Taken:
     place: int
     """Number of the frame in the log, from 1."""
     message: int
-    """Its key."""
+    """Its key in Bus.received."""
     sender: str
     """Who sends the message, by the DBC."""
     datagram: bytes
@@ -172,8 +186,9 @@ class _Reader:
         number = key(message.arbitration_id, message.is_extended_id)
         if message.is_error_frame:
             return
-        if number in self._bus.received:
-            self._take_received(message, place, self._bus.received[number])
+        received = self._bus.receives(message.arbitration_id, message.is_extended_id)
+        if received is not None:
+            self._take_received(message, place, received)
         elif number in self._bus.sent and not message.is_remote_frame:
             data = bytes(message.data)
             kind = self._bus.trace.get(number)
@@ -202,16 +217,16 @@ class _Reader:
                 del run.ticks[hole.tick :]
                 return
 
-    def _take_received(self, message: can.Message, place: int, known: DbcMessage) -> None:
+    def _take_received(self, message: can.Message, place: int, number: int) -> None:
+        known = self._bus.received[number]
         try:
             datagram = encode(message)
         except ValueError as error:
             raise LogError(f"{self.recording.path}: frame {place}: {error}") from error
-        fits = not message.is_remote_frame and message.is_fd == known.is_fd and message.dlc == known.length
+        long_enough = known.length <= message.dlc <= known.longest
+        fits = not message.is_remote_frame and message.is_fd == known.fd and long_enough
         fold = reduce(xor, message.data, message.arbitration_id & 0xFF) if fits else None
-        number = key(message.arbitration_id, message.is_extended_id)
-        sender = known.senders[0] if known.senders else ""
-        self.recording.received.append(Taken(place, number, sender, datagram, fold))
+        self.recording.received.append(Taken(place, number, self._bus.senders[number], datagram, fold))
 
     def _take_trace(self, kind: str, number: int, place: int, data: bytes) -> None:
         if kind == "CanopyTick":

@@ -43,7 +43,7 @@ def write_record(path: Path, bus: Bus, run: Run, inputs: Inputs) -> None:
 
 def _message(bus: Bus, kind: str) -> dict[str, Any]:
     message = next(bus.sent[number] for number, name in bus.trace.items() if name == kind)
-    return {"arbitration_id": message.frame_id, "is_extended_id": message.is_extended_frame}
+    return {"arbitration_id": message.id, "is_extended_id": message.extended}
 
 
 def _arrival(tick: Tick, age: int | None) -> bytes:
