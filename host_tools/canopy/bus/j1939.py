@@ -92,6 +92,7 @@ def _of_sources(message: SourceMessage) -> list[SourceMessage]:
     result = []
     for name, number in message.address.sources.items():
         one = copy.deepcopy(message)
+        one.origin = message.name
         one.name = f"{message.name}_{name}"
         _set(one, SOURCE, number)
         result.append(one)

@@ -125,17 +125,30 @@ def check_message(message: SourceMessage) -> None:
     if message.problem is not None:
         return
     try:
-        _join_names(message)
         _check_multiplexers(message)
         _drop_what_does_not_fit(message)
     except CompileError as error:
         message.problem = error
 
 
-def check_source(source: Source) -> None:
-    """The same of all messages, and among them: of two with one id the first one stays; names become each its own."""
+def name_apart(source: Source) -> None:
+    """Gives each message and signal a name of its own; the first of several keeps it. Before the overlay names them."""
     taken = {message.name for message in source.messages}
     names: set[str] = set()
+    for message in source.messages:
+        if message.problem is None:
+            _join_names(message)
+        if message.name not in names:
+            names.add(message.name)
+            continue
+        old = message.name
+        message.name = _free(old, f"_{message.frame_id:X}", taken)
+        text = f"there is another message '{old}': this one is '{message.name}' here"
+        message.notes.append((message.place, text))
+
+
+def check_source(source: Source) -> None:
+    """Finds what is wrong with each message, and among them: of two with one id the first one stays."""
     identifiers: dict[tuple[bool, int, int], SourceMessage] = {}
     for message in source.messages:
         check_message(message)
@@ -146,12 +159,4 @@ def check_source(source: Source) -> None:
         if other is not message:
             text = f"messages '{other.name}' and '{message.name}' have the same id 0x{message.frame_id:X}"
             help_text = f"to have '{message.name}': write `leave_out = true` for '{other.name}' in the overlay"
-            message.problem = CompileError(message.place, text, help_text if other.name != message.name else "")
-        elif message.name in names:
-            old = message.name
-            message.name = _free(old, f"_{message.frame_id:X}", taken)
-            message.notes.append(
-                (message.place, f"there is another message '{old}': this one is '{message.name}' here")
-            )
-        else:
-            names.add(message.name)
+            message.problem = CompileError(message.place, text, help_text)

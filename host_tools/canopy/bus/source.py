@@ -93,6 +93,8 @@ class SourceMessage:
     is_fd: bool = False
     is_j1939: bool = False
     reversed_ranges: list[ReversedRange] = field(default_factory=list)
+    origin: str = ""
+    """The message's name in the file, where there are several of it here, one for each source."""
     mask: int = 0
     """The bits of `frame_id` that count when a frame is received."""
     address: Address = field(default_factory=Address)

@@ -205,9 +205,14 @@ class Message:
         return self.mask == (0x1FFFFFFF if self.extended else 0x7FF)
 
     @property
+    def pgn(self) -> int:
+        """J1939: its parameter group number."""
+        return (self.id & (0x03FF0000 if (self.id >> 16) & 0xFF < 240 else 0x03FFFF00)) >> 8
+
+    @property
     def is_transported(self) -> bool:
         """J1939: does it come in several packets?"""
-        return self.j1939 and self.length > 8
+        return self.j1939 and self.length > 8 and not self.fd
 
     @property
     def multiplexed(self) -> tuple[Signal, ...]:
@@ -243,6 +248,11 @@ class Bus:
     def messages(self) -> tuple[Message, ...]:
         """Every message that there is code for, each once."""
         return tuple({message.name: message for message in (*self.receive, *self.send)}.values())
+
+    @property
+    def transported(self) -> tuple[Message, ...]:
+        """Received messages of several packets."""
+        return tuple(message for message in self.receive if message.is_transported)
 
     @property
     def received(self) -> frozenset[str]:

@@ -12,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from canopy.bus.doubts import Remark, doubts, impossible_range, left_out
+from canopy.bus.j1939 import NULL_ADDRESS, SOURCE, TRANSPORT_BYTES
 from canopy.bus.overlay import to_write
 from canopy.bus.soundness import overlap
 from canopy.bus.source import SourceMessage, SourceSignal
@@ -33,6 +34,9 @@ CYCLES_TO_TIMEOUT = 5
 
 
 def _check_e2e(message: SourceMessage) -> None:
+    if message.is_j1939 and message.length > TRANSPORT_BYTES:
+        text = f"message '{message.name}' comes in several packets, and has an E2EDataId: only frames are protected"
+        raise CompileError(message.place, text)
     for name, (start, length) in E2E_SIGNALS.items():
         signal = next((s for s in message.signals if s.name == name), None)
         if signal is None or (signal.start, signal.length, signal.little_endian) != (start, length, True):
@@ -224,6 +228,9 @@ def _read_sent(dbc: Dbc, message: SourceMessage) -> Message:
     """An output. Here nothing is left out: others wait for it."""
     if message.problem is None:
         read = _read_message(dbc, message)
+        if message.is_j1939 and not message.mask & SOURCE and message.frame_id & SOURCE == NULL_ADDRESS:
+            text = f"message '{message.name}' is sent, and its id has no source address"
+            raise CompileError(message.place, text, to_write(dbc.path, "source = ADDRESS", message.name))
         if read.receive_only is None:
             return read
         reason = read.receive_only
@@ -285,6 +292,8 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     _check_masks(dbc, receive)
     buffers = sum(2 * message.length for message in send)  # places in them: canopy_tx_message_t.place
     count(buffers, f"bytes of two buffers for each message that node '{node}' sends", Place(str(path)))
+    packets = sum(message.length for message in receive if message.is_transported)  # canopy_transport_t.place
+    count(packets, f"bytes of messages of several packets that node '{node}' receives", Place(str(path)))
     bus = dataclasses.replace(_make_bus(dbc, node, receive, send, trace, remarks, name), load=_load(dbc))
     check_outputs(dbc, bus.send, period_ms)
     return bus

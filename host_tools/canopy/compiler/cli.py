@@ -12,7 +12,7 @@ import click
 
 from canopy.compiler.bounds import BURST, LATENCY_US, LOAD_PERCENT, Bounds, Others, refusal
 from canopy.compiler.budget import Budget
-from canopy.compiler.dbc_file import bus_paths
+from canopy.compiler.dbc_file import bus_paths, remove_old_overlay
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
@@ -259,6 +259,7 @@ def command(
             sys.exit(INPUT_ERROR)
     for remark in application.bus.remarks:
         echo_lines(str(remark), err=True)
+    remove_old_overlay(output / dbc.name, files)
     write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
     if as_json:
         echo(dumps(budget.as_dict()))

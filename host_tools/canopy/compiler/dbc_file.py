@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,7 +14,7 @@ from pathlib import Path
 from canopy.bus.dbc_parser import LONG_HELP, DbcParser, is_too_long, too_long
 from canopy.bus.j1939 import set_masks
 from canopy.bus.overlay import apply_overlay, overlay_path
-from canopy.bus.soundness import check_source
+from canopy.bus.soundness import check_source, name_apart
 from canopy.bus.source import Given, Source, SourceMessage, SourceSignal
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.limits import Limits, whole
@@ -108,6 +109,13 @@ def read_bus_files(path: Path) -> dict[str, bytes]:
     return {file.name: read_dbc(file) for file in bus_paths(path)}
 
 
+def remove_old_overlay(target: Path, files: Mapping[str, bytes]) -> None:
+    """Before `files` are written, the copy of the file among them: its overlay of another run must not stay beside it."""
+    old = overlay_path(target)
+    if old.name not in files:
+        old.unlink(missing_ok=True)
+
+
 def hash_of(files: dict[str, bytes]) -> str:
     """16 hex digits that tell a file and its overlay from others."""
     return hashlib.sha256(b"".join(files.values())).hexdigest()[:16]
@@ -120,6 +128,7 @@ def load_dbc(path: Path) -> Dbc:
         CompileError: the file cannot be read, is no bus description, or the overlay is wrong.
     """
     source = _read_source(path)
+    name_apart(source)
     overlay = apply_overlay(path, source)
     set_masks(source)
     source.messages = [message for message in source.messages if not message.is_left_out]

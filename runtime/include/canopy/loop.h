@@ -44,6 +44,8 @@ typedef struct {
     void *input;           /**< The input image. */
     void *output;          /**< The output image. */
     canopy_rx_state_t *rx; /**< bus->rx_count. */
+    canopy_transport_state_t *transports; /**< bus->transport_count; NULL where there are none. */
+    uint8_t *transport_data;              /**< Room for all messages of several packets. */
     canopy_tx_t *tx;       /**< The transmit side: for the driver's transmit interrupt. */
     canopy_tx_memory_t tx_memory;
     canopy_trace_state_t *trace_state;

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xf819dfc052772d41u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_APP_H != 0xf819dfc052772d41u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xf819dfc052772d41u
 #error "files of two runs of canopy: generate them again"
 #endif
 

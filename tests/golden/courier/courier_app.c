@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xf92719b59034323fu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_APP_H != 0xf92719b59034323fu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf92719b59034323fu
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0x46ac56d2eb228f67u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0xf92719b59034323fu /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
