@@ -19,6 +19,7 @@ _FLAGS = """
 WARNINGS = _FLAGS.split()
 # The Arm compiler comes without a C library: the firmware tests' string.h, for memcpy and its like.
 BARE_LIBC = ROOT / "tests" / "firmware" / "support" / "libc"
+INCLUDE = f"-I{ROOT / 'runtime' / 'include'}"
 VALUES_MAX = 2048
 BYTES_MAX = 1785
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -10,8 +11,9 @@ import click
 from canopy.bus.doubts import left_out
 from canopy.bus.overlay import overlay_path
 from canopy.bus.overlay_writer import StartValues, Values, Wanted, overlay_text
+from canopy.bus.survey import FileResult, as_markdown, commit_of, survey_folder
 from canopy.compiler.dbc_file import load_dbc
-from canopy.compiler.errors import CompileError
+from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.output import fail, write_or_exit
 from canopy.escape.terminal import echo, echo_lines
 
@@ -58,3 +60,29 @@ def overlay(
     write_or_exit(target.parent, {}, {target: text.encode()}, (target,))
     questions = text.count('= "?"')
     echo(f"{target}: {questions} values to fill in")
+
+
+@command.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Write the tables there, in place of printing them."
+)
+def survey(folders: tuple[Path, ...], output: Path | None) -> None:
+    """Try every bus description below FOLDERS: a codec, and an application for each node.
+
+    Makes the tables of docs/dbc.md, as Markdown: how much can be used, and what is left out, and why. Applications are
+    made with the overlay that `canopy dbc overlay` writes, filled by rule. Exit status: 0, 1 a file cannot be read, 2 a
+    folder is not there.
+    """
+    found: dict[str, list[FileResult]] = {}
+    for folder in folders:
+        if not folder.is_dir():
+            fail(CompileError(Place(str(folder)), "is not a folder"))
+        commit = commit_of(folder)
+        found[f"{folder.resolve().name}{f' {commit}' if commit else ''}"] = list(survey_folder(folder))
+    text = as_markdown(found)
+    if output is None:
+        echo_lines(text)
+    else:
+        write_or_exit(output.parent, {output.name: text.encode()})
+    sys.exit(1 if any(result.error for results in found.values() for result in results) else 0)

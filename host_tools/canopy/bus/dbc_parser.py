@@ -297,7 +297,7 @@ class DbcParser:
         owners = [signal for signal in message.signals if signal.is_multiplexer]
         for signal in message.signals:
             said = self._multiplexers.get((self._numbers[id(message)], signal.name))
-            if said is not None and signal.marker:
+            if said is not None:  # whatever its mark says: some tools write M alone
                 signal.multiplexer = said[0]
                 signal.branches = merge([*said[1], *(signal.marker if len(owners) == 1 else ())])
             elif signal.marker and len(owners) == 1 and owners[0] is not signal:

@@ -58,7 +58,8 @@ def to_write(path: Path, line: str, message: str, signal: str = "") -> str:
     return f"to fix: write in {overlay_path(path).name}: {heading(message, signal)} {line}"
 
 
-def _decimal(value: Fraction) -> str:
+def decimal_text(value: Fraction) -> str:
+    """A number that has an end as a decimal one, exactly."""
     with localcontext() as context:
         context.prec = 400
         return format(Decimal(value.numerator) / Decimal(value.denominator), "f")
@@ -132,7 +133,7 @@ class Overlay:
             for key, attribute in _NUMBERS.items():
                 if key in table:
                     value = self._number(table[key], (*keys, key))
-                    message.attributes[attribute] = Given(_decimal(value), self._place((*keys, key)))
+                    message.attributes[attribute] = Given(decimal_text(value), self._place((*keys, key)))
             for key, take in _MESSAGE_KEYS.items():
                 if key in table:
                     take(self, message, table[key], (*keys, key))
@@ -210,7 +211,7 @@ class Overlay:
         low, high = (self._number(end, keys) for end in value)
         if low >= high:
             raise self._error(f"{'.'.join(keys)}: the first end must be below the second", keys)
-        signal.minimum, signal.maximum = Decimal(_decimal(low)), Decimal(_decimal(high))
+        signal.minimum, signal.maximum = Decimal(decimal_text(low)), Decimal(decimal_text(high))
 
     def _raw(self, message: SourceMessage, signal: SourceSignal, value: Any, keys: tuple[str, ...]) -> str:
         """The raw value of a physical one, or of the name of one."""
@@ -228,9 +229,9 @@ class Overlay:
             below = raw.numerator // raw.denominator
             near = ((number * Fraction(signal.scale) + Fraction(signal.offset)) for number in (below, below + 1))
             raise self._error(
-                f"{'.'.join(keys)} is {_decimal(physical)}, which '{message.name}.{signal.name}' cannot be",
+                f"{'.'.join(keys)} is {decimal_text(physical)}, which '{message.name}.{signal.name}' cannot be",
                 keys,
-                f"the nearest are {' and '.join(map(_decimal, near))}",
+                f"the nearest are {' and '.join(map(decimal_text, near))}",
             )
         return str(float(raw)) if signal.is_float else str(raw.numerator)
 

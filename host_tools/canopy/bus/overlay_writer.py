@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from decimal import Decimal
 from fractions import Fraction
 
-from canopy.bus.overlay import TO_FILL_IN, heading
+from canopy.bus.j1939 import NULL_ADDRESS, SOURCE
+from canopy.bus.overlay import TO_FILL_IN, decimal_text, heading
 from canopy.bus.source import SourceMessage, SourceSignal
-from canopy.compiler.bus_reader import E2E_SIGNALS
+from canopy.compiler.bus_reader import E2E_SIGNALS, read_sent
 from canopy.compiler.dbc_file import Dbc, number
 from canopy.compiler.errors import CompileError
 from canopy.compiler.trace_layout import trace_kind
@@ -29,6 +29,10 @@ class Values:
 
     def timeout_ms(self, _message: SourceMessage) -> str:
         """Of an input."""
+        return _QUESTION
+
+    def source(self, _message: SourceMessage) -> str:
+        """Of an output of J1939."""
         return _QUESTION
 
     def safe(self, _dbc: Dbc, _message: SourceMessage, _signal: SourceSignal) -> str:
@@ -57,9 +61,7 @@ class Wanted:
 
 def physical_text(signal: SourceSignal, raw: Fraction) -> str:
     """The physical value of a raw one, as TOML writes it."""
-    value = raw * Fraction(signal.scale) + Fraction(signal.offset)
-    decimal = Decimal(value.numerator) / Decimal(value.denominator)
-    return str(value.numerator) if value.denominator == 1 else format(decimal, "f")
+    return decimal_text(raw * Fraction(signal.scale) + Fraction(signal.offset))
 
 
 def _written(message: SourceMessage) -> str:
@@ -101,9 +103,18 @@ def _lacks_time(dbc: Dbc, message: SourceMessage, *names: str) -> bool:
 def _output(dbc: Dbc, message: SourceMessage, wanted: Wanted) -> Iterator[str]:
     yield from _of_message(message, "sent")
     yield heading(_written(message))
+    if message.is_j1939 and not message.mask & SOURCE and message.frame_id & SOURCE == NULL_ADDRESS:
+        yield f"source = {wanted.values.source(message)} # our address"
+        message.mask |= SOURCE
+    try:
+        read_sent(dbc, message)
+    except CompileError as error:
+        yield f"leave_out = true # {_comment(error.message)}"
+        return
     if wanted.node not in message.senders:
         yield f"senders = {_quoted([wanted.node])}"
-    if _lacks_time(dbc, message, "GenMsgCycleTime"):
+    cycle = number(dbc, "GenMsgCycleTime", message)
+    if not cycle or cycle.denominator != 1:
         yield f"cycle_ms = {wanted.values.cycle_ms(message)} # sent so often; a multiple of the period"
     data_id = number(dbc, "E2EDataId", message)
     hidden = E2E_SIGNALS if data_id is not None and data_id >= 0 else {}
@@ -122,12 +133,6 @@ def _input(dbc: Dbc, message: SourceMessage, wanted: Wanted) -> Iterator[str]:
         yield f"timeout_ms = {wanted.values.timeout_ms(message)} # fresh for so long after a frame; 0: for ever"
 
 
-def _unusable(message: SourceMessage, reason: CompileError) -> Iterator[str]:
-    yield f"# {_comment(reason.message)}"
-    yield heading(_written(message))
-    yield "leave_out = true"
-
-
 def overlay_text(dbc: Dbc, wanted: Wanted) -> str:
     """The overlay for one node.
 
@@ -144,12 +149,9 @@ def overlay_text(dbc: Dbc, wanted: Wanted) -> str:
         seen |= {message.origin} - {""}
         sent = message.name in wanted.send or wanted.node in message.senders
         received = message.name in wanted.receive or wanted.node in message.receivers
-        if message.problem is not None:
-            if sent:
-                parts.append(list(_unusable(message, message.problem)))
-        elif sent and trace_kind(message.name) is None:
+        if sent and trace_kind(message.name) is None:
             parts.append(list(_output(dbc, message, wanted)))
-        elif received and not sent:
+        elif received and not sent and message.problem is None:
             parts.append(list(_input(dbc, message, wanted)))
     told = [lines for lines in parts if len(lines) > 2]  # a table with something in it
     head = [f"# What {brief(dbc.path.name)} lacks for the node {brief(wanted.node)}; docs/dbc.md has every key."]

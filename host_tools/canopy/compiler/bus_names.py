@@ -27,8 +27,8 @@ size value choice fresh age_ms int8_t int16_t int32_t int64_t uint8_t uint16_t u
 _TAKEN = frozenset(_WORDS.split())
 _IMAGE_MEMBERS = ("now", "can_state", "overload", "written", "saturated", "halting")
 _BUS_WORDS = (
-    "bus", "transport_bytes", "bus_h", "codec_h", "input", "output", "acceptance", "rx_messages", "tx_messages", "tx_bytes",
-    "output_signals",
+    "bus", "bus_h", "codec_h", "input", "output", "acceptance", "rx_messages", "tx_messages", "tx_bytes",
+    "output_signals", "transport_bytes",
 )  # fmt: skip
 # What the application's header adds, with the same prefix.
 _APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")

@@ -224,33 +224,50 @@ def _make_bus(
     )
 
 
-def _read_sent(dbc: Dbc, message: SourceMessage) -> Message:
-    """An output. Here nothing is left out: others wait for it."""
-    if message.problem is None:
-        read = _read_message(dbc, message)
-        if message.is_j1939 and not message.mask & SOURCE and message.frame_id & SOURCE == NULL_ADDRESS:
-            text = f"message '{message.name}' is sent, and its id has no source address"
-            raise CompileError(message.place, text, to_write(dbc.path, "source = ADDRESS", message.name))
-        if read.receive_only is None:
-            return read
+def read_sent(dbc: Dbc, message: SourceMessage) -> Message:
+    """An output. Here nothing is left out: others wait for it.
+
+    Raises:
+        CompileError: it cannot be sent.
+    """
+    if message.problem is not None:
+        raise _with_way(message.problem, message)
+    read = _read_message(dbc, message)
+    if message.is_j1939 and not message.mask & SOURCE and message.frame_id & SOURCE == NULL_ADDRESS:
+        text = f"message '{message.name}' is sent, and its id has no source address"
+        raise CompileError(message.place, text, to_write(dbc.path, "source = ADDRESS", message.name))
+    if read.receive_only is not None:
         reason = read.receive_only
-        raise CompileError(reason.place, f"{reason.message}: '{message.name}' cannot be sent so", reason.help_text)
-    help_text = message.problem.help_text
-    both = f"{help_text}; {to_do_without(message.name)}" if help_text else to_do_without(message.name)
-    raise CompileError(message.problem.place, message.problem.message, both)
+        wrong = CompileError(reason.place, f"{reason.message}: '{message.name}' cannot be sent so", reason.help_text)
+        raise _with_way(wrong, message)
+    _check_frame(message.place, read, sent=True)
+    return read
+
+
+def _with_way(problem: CompileError, message: SourceMessage) -> CompileError:
+    """The same with one more way out."""
+    ways = [problem.help_text, to_do_without(message.name)]
+    return CompileError(problem.place, problem.message, "; ".join(way for way in ways if way))
 
 
 def _read_received(dbc: Dbc, message: SourceMessage, remarks: list[Remark]) -> list[Message]:
     """An input, or none where its layout cannot be taken: a leaf that reads it is told so."""
+    read = None
     if message.problem is None:
         try:
-            return [_read_message(dbc, message)]
+            read = _read_message(dbc, message)
         except CompileError:
             if message.problem is None:
                 raise
+    if read is not None:
+        try:
+            _check_frame(message.place, read, sent=False)
+        except CompileError as error:
+            message.problem = error
     if message.problem is not None:
         remarks.append(left_out(message.problem))
-    return []
+        return []
+    return [] if read is None else [read]
 
 
 def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> Bus:
@@ -279,15 +296,12 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
                     f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
                     "give each node that runs a tree its own",
                 )
-            trace[kind] = _read_sent(dbc, message)
+            trace[kind] = read_sent(dbc, message)
             check_every(attribute_place(dbc, "GenMsgCycleTime", message), trace[kind], period_ms)
         elif sent:
-            send.append(_read_sent(dbc, message))
-            _check_frame(message.place, send[-1], sent=True)
+            send.append(read_sent(dbc, message))
         elif node in message.receivers or message.has_lost_signals:
-            for read in _read_received(dbc, message, remarks):
-                _check_frame(message.place, read, sent=False)
-                receive.append(read)
+            receive += _read_received(dbc, message, remarks)
     receive = _in_order(receive)
     _check_masks(dbc, receive)
     buffers = sum(2 * message.length for message in send)  # places in them: canopy_tx_message_t.place

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 from canopy.bus.dbc_parser import LONG_HELP, DbcParser, is_too_long, too_long
+from canopy.bus.foreign import KINDS, read_foreign, refuse_kind
 from canopy.bus.j1939 import set_masks
 from canopy.bus.overlay import apply_overlay, overlay_path
 from canopy.bus.soundness import check_source, name_apart
@@ -110,7 +111,7 @@ def read_bus_files(path: Path) -> dict[str, bytes]:
 
 
 def remove_old_overlay(target: Path, files: Mapping[str, bytes]) -> None:
-    """Before `files` are written, the copy of the file among them: its overlay of another run must not stay beside it."""
+    """Before `files` with the copy `target` are written: an overlay of another run must not stay beside it."""
     old = overlay_path(target)
     if old.name not in files:
         old.unlink(missing_ok=True)
@@ -131,13 +132,20 @@ def load_dbc(path: Path) -> Dbc:
     name_apart(source)
     overlay = apply_overlay(path, source)
     set_masks(source)
+    for message in source.messages:  # a file need not list its nodes
+        used = [*message.senders, *sorted(message.receivers)]
+        source.nodes += [node for node in dict.fromkeys(used) if node not in source.nodes]
     source.messages = [message for message in source.messages if not message.is_left_out]
     check_source(source)
     return Dbc(path, source, overlay)
 
 
 def _read_source(path: Path) -> Source:
-    parser = DbcParser(str(path), decode_dbc(read_dbc(path)))
+    refuse_kind(path)
+    text = decode_dbc(read_dbc(path))
+    if path.suffix.lower() in KINDS:
+        return read_foreign(path, text)
+    parser = DbcParser(str(path), text)
     if not parser.is_dbc:
         raise CompileError(Place(str(path)), "not a DBC that can be read: it has no statement of one")
     return parser.source
@@ -145,11 +153,8 @@ def _read_source(path: Path) -> Source:
 
 def check_node(dbc: Dbc, node: str) -> None:
     """Raises CompileError when the bus has no such node."""
-    known = set(dbc.source.nodes)
-    for message in dbc.source.messages:
-        known |= {*message.senders, *message.receivers}
-    if node not in known:
-        help_text = f"{nearest(node, known)}; an overlay may name it as a sender or receiver"
+    if node not in dbc.source.nodes:
+        help_text = f"{nearest(node, dbc.source.nodes)}; an overlay may name it as a sender or receiver"
         raise CompileError(Place(str(dbc.path)), f"no node '{node}'", help_text)
 
 
