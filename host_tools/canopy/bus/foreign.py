@@ -41,7 +41,7 @@ def _way(path: Path) -> str:
 def _reason(error: Exception, kind: str) -> str:
     """What cantools says of the file. What Python says of cantools' own variables helps nobody."""
     inner = getattr(error, f"e_{kind}", None) or error
-    if not isinstance(inner, (Error, ValueError)):
+    if not isinstance(inner, (Error, ValueError, SyntaxError)):
         return "it has parts that cantools does not know"
     return " ".join(str(inner).split())
 

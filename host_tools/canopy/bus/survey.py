@@ -34,7 +34,7 @@ _LONGEST_REASON = 110
 
 
 class RuleValues(Values):
-    """Fills an overlay by rule: cycles of 100 ms, timeouts of 500 ms, address 0, and of all values that may be sent what is nearest to 0."""
+    """Fills an overlay by rule: 100 ms, timeouts of 500 ms, address 0, and the value nearest to 0 that may be sent."""
 
     def cycle_ms(self, _message: SourceMessage) -> str:
         """Of an output."""

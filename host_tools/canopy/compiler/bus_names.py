@@ -32,6 +32,7 @@ _BUS_WORDS = (
 )  # fmt: skip
 # What the application's header adds, with the same prefix.
 _APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")
+_SIGNAL_WORDS = ("physical", "per_unit", "fixed", "from_fixed")
 _MESSAGE_WORDS = ("id", "mask", "length", "extended", "fd", "cycle_ms", "data_id")
 
 
@@ -80,6 +81,9 @@ def _name_signals(message: Message, everything: _Names) -> Message:
     for signal in message.signals:
         wanted = snake(_spelled(signal.name))
         c_name = _free(f"{wanted}_" if wanted in _TAKEN else wanted, [members, everything], f"{message.c_name}_")
+        while any(f"{message.c_name}_{c_name}_{word}" in everything for word in _SIGNAL_WORDS):
+            c_name = _free(wanted, [members, everything], f"{message.c_name}_")
+        everything |= {f"{message.c_name}_{c_name}_{word}" for word in _SIGNAL_WORDS}
         named.append(dataclasses.replace(signal, c_name=c_name))
     names = {signal.name: signal.c_name for signal in named}
     for place, signal in enumerate(named):

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xf819dfc052772d41u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x0f89a0504476c4b9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0xf819dfc052772d41u
+#if CANOPY_GENERATED_COOLER_APP_H != 0x0f89a0504476c4b9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xf819dfc052772d41u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x0f89a0504476c4b9u
 #error "files of two runs of canopy: generate them again"
 #endif
 

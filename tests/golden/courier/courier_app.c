@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xf92719b59034323fu
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x9e1571962b451387u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0xf92719b59034323fu
+#if CANOPY_GENERATED_COURIER_APP_H != 0x9e1571962b451387u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xf92719b59034323fu
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x9e1571962b451387u
 #error "files of two runs of canopy: generate them again"
 #endif
 

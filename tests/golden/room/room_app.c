@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x75a10687a54e9467u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xb677edb8e1c2c1d8u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x75a10687a54e9467u
+#if CANOPY_GENERATED_ROOM_APP_H != 0xb677edb8e1c2c1d8u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x75a10687a54e9467u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xb677edb8e1c2c1d8u
 #error "files of two runs of canopy: generate them again"
 #endif
 
