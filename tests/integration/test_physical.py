@@ -108,9 +108,9 @@ def test_physical_values(tmp_path: Path, name: str) -> None:
     subprocess.run([*command, tmp_path / "main.c", "-o", tmp_path / "main"], check=True)
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(done) == len(wanted)
-    for line, (whole, raw, other, physical, by_cantools) in zip(done, wanted, strict=True):
+    for line, (whole_, raw, other, physical, by_cantools) in zip(done, wanted, strict=True):
         found = line.split()
-        assert [int(part) for part in found[:3]] == [whole, raw, other], line
+        assert [int(part) for part in found[:3]] == [whole_, raw, other], line
         assert abs(Fraction(float(found[3])) - physical) <= abs(physical) * Fraction(2, 2**53), (line, float(physical))
         assert float(found[3]) == pytest.approx(float(by_cantools), rel=1e-12, abs=1e-9)
 
