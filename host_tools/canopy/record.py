@@ -19,7 +19,6 @@ from canopy.canbus import CanBusError, is_plain_data, open_bus, receive_losses, 
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import Styled, echo
 from canopy.model import Model, ModelError, load_model
-from canopy.replay.log import NEEDED
 from canopy.stop import StopFlag
 from canopy.trace import TraceDecoder, TreeView
 
@@ -79,12 +78,6 @@ class Recorder:
         self._told: set[str] = set()
         if model is not None:
             self.summary.ticks = self.summary.trace_lost = self.summary.starts = 0
-            missing = [name for name in NEEDED if name not in model.trace]
-            if missing:
-                self._tell(
-                    f"{model.path}: trace: has no {' and no '.join(missing)}: the log cannot be replayed; add them to "
-                    "the DBC as in docs/trace.md, and build again"
-                )
 
     def take(self, message: can.Message) -> None:
         """Writes one frame."""

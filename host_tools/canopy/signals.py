@@ -63,7 +63,7 @@ class SignalTable:
         self.refused = 0
         bus = load_bus(model)
         by_name = {message.name: message for message in bus.messages}
-        watched = [by_name[name] for name in dict.fromkeys(model.receive + model.send) if name not in model.trace]
+        watched = [by_name[name] for name in dict.fromkeys(model.receive + model.send)]
         self._ids = IdTable(tuple(watched))
         self._watched = {message.name: _watch(message, message.name in model.send) for message in watched}
 

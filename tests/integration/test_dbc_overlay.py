@@ -11,7 +11,6 @@ from click.testing import CliRunner, Result
 
 from canopy.cli import main
 from canopy.compiler.bus_reader import read_bus
-from canopy.compiler.trace_layout import TRACE_LAYOUT
 from canopy.model import ModelError, load_model
 from canopy.replay.log import Bus
 from canopy.signals import SignalTable
@@ -60,7 +59,7 @@ def put(folder: Path, overlay: str | None = FILLED, dbc: str = DBC) -> Path:
 def compiled(folder: Path, dbc: Path, node: str = "ECU") -> Result:
     (folder / "t.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
     arguments = ["compile", str(folder / "t.xml"), "--dbc", str(dbc), "--node", node, "--period-ms", "50"]
-    return CliRunner().invoke(main, [*arguments, "--name", "app", "-o", str(folder / "out")])
+    return CliRunner().invoke(main, [*arguments, "--trace", "0x600", "--name", "app", "-o", str(folder / "out")])
 
 
 def overlay(*arguments: str | Path) -> Result:
@@ -186,10 +185,7 @@ def test_the_codec_and_check_read_it_too(tmp_path: Path) -> None:
 
 
 def test_the_tools_read_the_copies_beside_the_model(tmp_path: Path) -> None:
-    layout = TRACE_LAYOUT["CanopyTick"].items()
-    tick = "".join(f' SG_ {name} : {start}|{length}@1+ (1,0) [0|0] "" Robot\n' for name, (start, length) in layout)
-    traced = DBC.replace("CM_ BO_ 101", f"BO_ 1800 CanopyTick: 8 ECU\n{tick}CM_ BO_ 101")
-    dbc = put(tmp_path, FILLED + "[message.State.signal.a]\nsigned = true\n", traced)
+    dbc = put(tmp_path, FILLED + "[message.State.signal.a]\nsigned = true\n")
     assert compiled(tmp_path, dbc).exit_code == 0
     model = load_model(tmp_path / "out" / "app.model.json")
     table = SignalTable(model)
@@ -202,7 +198,7 @@ def test_the_tools_read_the_copies_beside_the_model(tmp_path: Path) -> None:
         SignalTable(model)
     # Compiled again without an overlay that matters, the old copy is gone.
     (tmp_path / "car.overlay.toml").unlink()
-    dbc.write_text(traced.replace("BO_ 100 Cmd: 3 ECU", "BO_ 100 Cmd: 3 Robot"))
+    dbc.write_text(DBC.replace("BO_ 100 Cmd: 3 ECU", "BO_ 100 Cmd: 3 Robot"))
     assert compiled(tmp_path, dbc).exit_code == 0 and not copy.exists()
     SignalTable(load_model(tmp_path / "out" / "app.model.json"))
 
@@ -232,10 +228,6 @@ cycle_ms = 50
 e2e_data_id = 2
 [message.PostureCommand.signal.Mode]
 safe = "Stop"
-[message.CanopyHealth]
-cycle_ms = 1000
-[message.CanopyModel]
-cycle_ms = 1000
 """
 
 

@@ -13,7 +13,6 @@ from canopy.bus.source import SourceMessage, SourceSignal
 from canopy.compiler.bus_reader import E2E_SIGNALS, read_sent
 from canopy.compiler.dbc_file import Dbc, number
 from canopy.compiler.errors import CompileError
-from canopy.compiler.trace_layout import trace_kind
 from canopy.escape.visible import brief
 
 _TABLE_SHOWN = 8
@@ -149,9 +148,9 @@ def overlay_text(dbc: Dbc, wanted: Wanted) -> str:
         seen |= {message.origin} - {""}
         sent = message.name in wanted.send or wanted.node in message.senders
         received = message.name in wanted.receive or wanted.node in message.receivers
-        if sent and trace_kind(message.name) is None:
+        if sent:
             parts.append(list(_output(dbc, message, wanted)))
-        elif received and not sent and message.problem is None:
+        elif received and message.problem is None:
             parts.append(list(_input(dbc, message, wanted)))
     told = [lines for lines in parts if len(lines) > 2]  # a table with something in it
     head = [f"# What {brief(dbc.path.name)} lacks for the node {brief(wanted.node)}; docs/dbc.md has every key."]

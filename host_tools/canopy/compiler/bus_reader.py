@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A DBC as one of its nodes sees it: what it receives, what it sends, and the trace messages of Canopy; or all of it.
+"""A bus as one of its nodes sees it: what it receives and what it sends; or all of it.
 
 Attributes that are read (docs/dbc.md), from the file or its overlay: GenMsgCycleTime, GenMsgTimeoutTime, E2EDataId of
 messages, GenSigInactiveValue of signals.
@@ -18,15 +18,15 @@ from canopy.bus.soundness import overlap
 from canopy.bus.source import SourceMessage, SourceSignal
 from canopy.compiler.bus_model import FD_LENGTHS, Bus, Message, Signal
 from canopy.compiler.bus_names import name_messages
-from canopy.compiler.bus_outputs import check_every, check_outputs
-from canopy.compiler.dbc_file import Dbc, attribute, attribute_place, check_node, load_dbc, number
+from canopy.compiler.bus_outputs import check_outputs
+from canopy.compiler.dbc_file import Dbc, attribute, check_node, load_dbc, load_text, number
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.limits import DATA_ID, TIME_MS, count
 from canopy.compiler.names import snake
 from canopy.compiler.signal_reader import is_safe, nearest_allowed, read_signal, with_safe_value
-from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace, trace_kind
+from canopy.compiler.trace_layout import MESSAGES as TRACE_MESSAGES
 
-__all__ = ["TRACE_LAYOUT", "Bus", "Message", "Signal", "read_bus", "read_messages"]
+__all__ = ["Bus", "Message", "Signal", "read_bus", "read_messages"]
 
 E2E_SIGNALS = {"E2E_CRC": (0, 8), "E2E_Counter": (8, 4)}
 CYCLES_TO_TIMEOUT = 5
@@ -144,6 +144,17 @@ def to_do_without(name: str) -> str:
     return f"to do without it: write `leave_out = true` for '{name}' in the overlay"
 
 
+def _check_no_trace(message: SourceMessage, node: str) -> None:
+    """Until version 2 of the trace its messages stood in the DBC."""
+    if message.name.partition("_")[0] in (*TRACE_MESSAGES, "CanopyArrivals"):
+        raise CompileError(
+            message.place,
+            f"node '{node}' sends '{message.name}', and the trace's messages are made by the compiler",
+            "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600), or another id "
+            "that begins eight free ones",
+        )
+
+
 def _with_good_safe_values(message: Message) -> Message:
     """Where nobody has asked for safe values, a default of the DBC may not fit: then what is nearest to it does."""
     signals = tuple(
@@ -196,7 +207,6 @@ def _make_bus(
     node: str,
     receive: list[Message],
     send: list[Message],
-    trace: dict[str, Message],
     remarks: list[Remark],
     name: str | None = None,
 ) -> Bus:
@@ -218,7 +228,6 @@ def _make_bus(
         node=node,
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
-        trace=trace,
         source=dbc,
         remarks=tuple(remarks),
     )
@@ -281,24 +290,13 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     """
     dbc = load_dbc(path)
     check_node(dbc, node)
-    trace: dict[str, Message] = {}
     receive: list[Message] = []
     send: list[Message] = []
     remarks = [left_out(problem) for problem in dbc.source.problems]
     for message in _by_id(dbc):
         sent = node in message.senders
-        kind = trace_kind(message.name) if sent else None
-        if kind is not None:
-            check_trace(message.place, message, kind)
-            if kind in trace:
-                raise CompileError(
-                    message.place,
-                    f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
-                    "give each node that runs a tree its own",
-                )
-            trace[kind] = read_sent(dbc, message)
-            check_every(attribute_place(dbc, "GenMsgCycleTime", message), trace[kind], period_ms)
-        elif sent:
+        if sent:
+            _check_no_trace(message, node)
             send.append(read_sent(dbc, message))
         elif node in message.receivers or message.has_lost_signals:
             receive += _read_received(dbc, message, remarks)
@@ -308,7 +306,7 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     count(buffers, f"bytes of two buffers for each message that node '{node}' sends", Place(str(path)))
     packets = sum(message.length for message in receive if message.is_transported)  # canopy_transport_t.place
     count(packets, f"bytes of messages of several packets that node '{node}' receives", Place(str(path)))
-    bus = dataclasses.replace(_make_bus(dbc, node, receive, send, trace, remarks, name), load=_load(dbc))
+    bus = dataclasses.replace(_make_bus(dbc, node, receive, send, remarks, name), load=_load(dbc))
     check_outputs(dbc, bus.send, period_ms)
     return bus
 
@@ -322,7 +320,15 @@ def read_messages(path: Path, node: str = "", only: tuple[str, ...] = ()) -> Bus
     Raises:
         CompileError: the file cannot be read, has no such node or message, or nothing of it can be compiled.
     """
-    dbc = load_dbc(path)
+    return _read_for_codecs(load_dbc(path), node, only)
+
+
+def read_text(text: str) -> Bus:
+    """The messages of a DBC that is a text of ours. Raises CompileError as read_messages() does."""
+    return _read_for_codecs(load_text(text), "", ())
+
+
+def _read_for_codecs(dbc: Dbc, node: str, only: tuple[str, ...]) -> Bus:
     if node:
         check_node(dbc, node)
     for name in only:
@@ -352,7 +358,7 @@ def read_messages(path: Path, node: str = "", only: tuple[str, ...] = ()) -> Bus
             send.append(read)
     if problems and not receive and not send:
         raise problems[0]
-    return _make_bus(dbc, node, receive, send, {}, [*map(left_out, problems), *remarks])
+    return _make_bus(dbc, node, receive, send, [*map(left_out, problems), *remarks])
 
 
 def _read_for_codec(dbc: Dbc, message: SourceMessage, *, required: bool) -> Message | None:

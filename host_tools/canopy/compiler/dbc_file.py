@@ -122,6 +122,15 @@ def hash_of(files: dict[str, bytes]) -> str:
     return hashlib.sha256(b"".join(files.values())).hexdigest()[:16]
 
 
+def load_text(text: str) -> Dbc:
+    """A DBC that is a text, and no file; it has no overlay."""
+    source = DbcParser("", text).source
+    name_apart(source)
+    set_masks(source)
+    check_source(source)
+    return Dbc(Path("text.dbc"), source, None)
+
+
 def load_dbc(path: Path) -> Dbc:
     """Reads a bus description and its overlay. A message of which there can be no code is left out.
 

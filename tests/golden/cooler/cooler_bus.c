@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x0f89a0504476c4b9u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x2d19a2fabd349ce0u
 #error "files of two runs of canopy: generate them again"
 #endif
 

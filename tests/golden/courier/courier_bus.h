@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0x9e1571962b451387u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0xc1f5f64f0ca2d203u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -119,12 +119,6 @@ typedef enum {
 #define COURIER_DRIVE_SPEED_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
 /** The physical value of a raw one, as a double: only where your program may use floating point. */
 #define COURIER_DRIVE_SPEED_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
-
-/* The trace. */
-#define COURIER_CANOPY_TICK_ID 0x600u
-#define COURIER_CANOPY_CHANGE_ID 0x601u
-#define COURIER_CANOPY_SNAPSHOT_ID 0x602u
-#define COURIER_CANOPY_HEALTH_ID 0x603u
 
 /**
  * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xb677edb8e1c2c1d8u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0x2c72b89ae9721876u
 #error "files of two runs of canopy: generate them again"
 #endif
 
