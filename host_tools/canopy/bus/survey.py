@@ -24,6 +24,7 @@ from canopy.compiler.dbc_file import Dbc, load_dbc, number
 from canopy.compiler.emit import render_bus
 from canopy.compiler.errors import CompileError
 from canopy.compiler.signal_reader import read_signal
+from canopy.files import write_files
 
 SUFFIXES = (".dbc", *KINDS)
 RULE_MS = 100
@@ -105,7 +106,7 @@ def try_application(path: Path, dbc: Dbc, node: str) -> str:
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / path.name
             shutil.copyfile(path, copy)
-            overlay_path(copy).write_text(text, encoding="utf-8")
+            write_files({overlay_path(copy): text.encode()})
             period_ms = _period_ms(dbc)
             render_bus(read_bus(copy, node, period_ms), period_ms)
     except CompileError as error:
