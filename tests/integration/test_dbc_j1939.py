@@ -12,6 +12,8 @@ from click.testing import CliRunner, Result
 from canopy.bus.decode import IdTable
 from canopy.cli import main
 from canopy.compiler.bus_reader import read_bus, read_messages
+from canopy.model import ModelError, load_model
+from canopy.replay.log import Bus
 from integration.codec_harness import ROOT, WARNINGS
 
 HEAD = 'VERSION ""\n\nBU_: Gauge Vector__XXX\n\n'
@@ -75,12 +77,12 @@ destination = 33
 """
 
 
-def compile_it(folder: Path, dbc: str, overlay: str, name: str = "truck", node: str = "Gauge") -> Result:
+def compile_it(folder: Path, dbc: str, overlay: str, name: str = "truck", more: tuple[str, ...] = ()) -> Result:
     (folder / f"{name}.dbc").write_text(dbc)
     (folder / f"{name}.overlay.toml").write_text(overlay)
     (folder / "t.xml").write_text(TREE)
-    arguments = ["compile", str(folder / "t.xml"), "--dbc", str(folder / f"{name}.dbc"), "--node", node]
-    return CliRunner().invoke(main, [*arguments, "--period-ms", "100", "--name", name, "-o", str(folder)])
+    arguments = ["compile", str(folder / "t.xml"), "--dbc", str(folder / f"{name}.dbc"), "--node", "Gauge"]
+    return CliRunner().invoke(main, [*arguments, "--period-ms", "100", "--name", name, "-o", str(folder), *more])
 
 
 def play(folder: Path, leaf: str, log: list[str], name: str = "truck") -> list[str]:
@@ -207,6 +209,12 @@ def test_the_codec_says_which_bits_count(tmp_path: Path) -> None:
     assert CliRunner().invoke(main, ["codec", str(tmp_path / "truck.dbc"), "-o", str(tmp_path)]).exit_code == 0
     header = (tmp_path / "truck_codec.h").read_text()
     assert "TRUCK_EEC1_MASK 0x3FFFF00u" in header and "parameter group 61444" in header
+
+
+def test_a_replay_says_that_it_cannot_put_packets_together(tmp_path: Path) -> None:
+    assert compile_it(tmp_path, TRUCK, OVERLAY, more=("--trace", "0x600")).exit_code == 0
+    with pytest.raises(ModelError, match="DM1 comes in several packets"):
+        Bus(load_model(tmp_path / "truck.model.json"))
 
 
 def test_the_tools_find_messages_by_their_group(tmp_path: Path) -> None:

@@ -83,6 +83,11 @@ class Bus:
             if message.data_id is not None:
                 self.protected[number] = message.data_id
         for place, name in enumerate(model.receive):
+            if messages[name].is_transported:
+                raise ModelError(
+                    f"{model.path}: bus: {name} comes in several packets, which a replay cannot put together; leave it out "
+                    "of the bus with the overlay's `leave_out = true`, and record again"
+                )
             self.received[place] = messages[name]
             senders = bus.source.message(name).senders
             self.senders[place] = senders[0] if senders else ""
