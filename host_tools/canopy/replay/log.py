@@ -85,8 +85,8 @@ class Bus:
         for place, name in enumerate(model.receive):
             if messages[name].is_transported:
                 raise ModelError(
-                    f"{model.path}: bus: {name} comes in several packets, which a replay cannot put together; leave it out "
-                    "of the bus with the overlay's `leave_out = true`, and record again"
+                    f"{model.path}: bus: {name} comes in several packets, which a replay cannot put together; leave it "
+                    "out of the bus with the overlay's `leave_out = true`, and record again"
                 )
             self.received[place] = messages[name]
             senders = bus.source.message(name).senders
