@@ -100,7 +100,7 @@ test-logic: # canopy verify --never and --always: circuits, and what berkeley-ab
 test-trace: # the trace with losses: a million ticks for each way to lose frames, and for each decoder; in CI far fewer
 	$(call BUILD,host)
 	@seed=$${CANOPY_SEED:-$$(date +%s)} && build/host/tests/trace/trace_trial 7000000 $$seed && \
-	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} CANOPY_SEED=$$seed $(PYTEST) -s --timeout 3600 tests/integration/test_trace.py tests/integration/test_trace_decoders.py
+	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} CANOPY_SEED=$$seed $(PYTEST) -s --timeout 3600 tests/integration/test_trace_losses.py tests/integration/test_trace_decoders.py
 
 test-asan:
 	$(call BUILD,asan)

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COOLER_BUS_H
-#define CANOPY_GENERATED_COOLER_BUS_H 0x2d19a2fabd349ce0u /* of this run */
+#define CANOPY_GENERATED_COOLER_BUS_H 0x4782880113e71b53u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xc1f5f64f0ca2d203u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
 #error "files of two runs of canopy: generate them again"
 #endif
 

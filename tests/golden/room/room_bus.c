@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x2c72b89ae9721876u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe09dd04358732ff8u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H 0x2c72b89ae9721876u /* of this run */
+#define CANOPY_GENERATED_ROOM_BUS_H 0xe09dd04358732ff8u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
