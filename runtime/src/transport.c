@@ -86,17 +86,13 @@ static void announce(canopy_bus_state_t *self, const canopy_can_frame_t *frame)
         canopy_count(&self->counters.wrong_form);
         return;
     }
-    self->transports[index] = (canopy_transport_state_t){.announced_at = frame->time,
-                                                         .last_at = frame->time,
-                                                         .size = size,
-                                                         .source = source_of(frame),
-                                                         .next = 1};
+    self->transports[index] = (canopy_transport_state_t){
+        .announced_at = frame->time, .last_at = frame->time, .size = size, .source = source_of(frame), .next = 1};
 }
 
 static bool is_next(const canopy_transport_state_t *state, const canopy_can_frame_t *frame)
 {
-    return frame->data[0] == state->next &&
-           !canopy_time_reached(frame->time, state->last_at + CANOPY_TRANSPORT_GAP_US);
+    return frame->data[0] == state->next && !canopy_time_reached(frame->time, state->last_at + CANOPY_TRANSPORT_GAP_US);
 }
 
 /** Puts the packet's bytes behind those that are there. */

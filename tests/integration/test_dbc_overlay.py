@@ -237,7 +237,7 @@ def test_the_simulator_and_the_replay_read_it(tmp_path: Path) -> None:
         load_messages(dbc)
     (tmp_path / "nao.overlay.toml").write_text(OVERLAY_OF_NAO)
     messages = load_messages(dbc)
-    assert (messages.battery.cycle, messages.power_command.safe_mode, messages.posture_command.timeout) == (
+    assert (messages.battery.cycle, messages.power_command.safe["Mode"], messages.posture_command.timeout) == (
         0.1,
         0,
         0.25,

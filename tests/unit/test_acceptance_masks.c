@@ -147,7 +147,8 @@ static void test_listed_sets_stay_as_they_are(void)
     static const uint32_t own[] = {0x18F00421u | EXT, 0x100};
     const canopy_can_acceptance_t acceptance = {.ids = own, .count = 2, .masks = groups, .mask_count = 2};
 
-    TEST_ASSERT_EQUAL(3, canopy_can_acceptance_masks(&acceptance, masks, MOST, &exact)); /* the first id is in a group */
+    TEST_ASSERT_EQUAL(3,
+                      canopy_can_acceptance_masks(&acceptance, masks, MOST, &exact)); /* the first id is in a group */
     TEST_ASSERT_TRUE(exact);
     TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 3, 0x0CF00400u | EXT));
     TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 3, 0x18FEF1FEu | EXT));

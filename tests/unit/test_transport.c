@@ -25,19 +25,19 @@ static canopy_transport_state_t transport_states[3];
 static uint8_t transport_data[LONG_BYTES + LONGER_BYTES + 9];
 static canopy_bus_state_t bus;
 
-#define DECODER(name, place, length)                                                                                   \
-    static bool decode_##name(void *input, const uint8_t *data)                                                        \
-    {                                                                                                                  \
-        (void)input;                                                                                                   \
-        taken[place]++;                                                                                                \
-        memcpy(bytes, data, length);                                                                                   \
-        return data[0] != 0xEEu;                                                                                       \
-    }                                                                                                                  \
-    static void age_##name(void *input, bool fresh, uint16_t age_ms)                                                   \
-    {                                                                                                                  \
-        (void)input;                                                                                                   \
-        (void)fresh;                                                                                                   \
-        age[place] = age_ms;                                                                                           \
+#define DECODER(name, place, length)                                 \
+    static bool decode_##name(void *input, const uint8_t *data)      \
+    {                                                                \
+        (void)input;                                                 \
+        taken[place]++;                                              \
+        memcpy(bytes, data, length);                                 \
+        return data[0] != 0xEEu;                                     \
+    }                                                                \
+    static void age_##name(void *input, bool fresh, uint16_t age_ms) \
+    {                                                                \
+        (void)input;                                                 \
+        (void)fresh;                                                 \
+        age[place] = age_ms;                                         \
     }
 DECODER(exact, EXACT, 8)
 DECODER(plain, PLAIN, 2)
@@ -47,13 +47,13 @@ DECODER(long, LONG, LONG_BYTES)
 DECODER(longer, LONGER, LONGER_BYTES)
 DECODER(us, FOR_US, 9)
 
-#define MESSAGE(number, bits, size, name)                                                                              \
-    {.id = (number),                                                                                                   \
-     .mask = (bits),                                                                                                   \
-     .length = (size),                                                                                                 \
-     .flags = CANOPY_CAN_EXTENDED,                                                                                     \
-     .data_id = CANOPY_E2E_NONE,                                                                                       \
-     .decode = decode_##name,                                                                                          \
+#define MESSAGE(number, bits, size, name) \
+    {.id = (number),                      \
+     .mask = (bits),                      \
+     .length = (size),                    \
+     .flags = CANOPY_CAN_EXTENDED,        \
+     .data_id = CANOPY_E2E_NONE,          \
+     .decode = decode_##name,             \
      .set_age = age_##name}
 
 static const canopy_rx_message_t rx[MESSAGES] = {
@@ -177,8 +177,7 @@ static void a_frame_may_be_longer_where_the_table_says_so(void)
 
 static void packets_make_a_message(void)
 {
-    static const uint8_t wanted[LONG_BYTES] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10,
-                                               11, 12, 13, 14, 15, 16, 17, 18, 19, 20};
+    static const uint8_t wanted[LONG_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20};
 
     announce(DM1, ENGINE, LONG_BYTES, 1000);
     packet(ENGINE, 1, 51000);

@@ -35,11 +35,11 @@ typedef struct {
  * a list that continues with it.
  */
 typedef struct canopy_can_acceptance {
-    const uint32_t *ids; /**< Lives as long as the driver is open. NULL when count is 0. */
-    uint16_t count;      /**< 0..CANOPY_CAN_ACCEPT_MAX */
-    uint16_t mask_count; /**< 0..CANOPY_CAN_ACCEPT_MAX; both together at most that. */
-    bool everything;     /**< Every data and remote frame, whatever the ids: for tools that watch. */
-    bool error_frames;   /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
+    const uint32_t *ids;            /**< Lives as long as the driver is open. NULL when count is 0. */
+    uint16_t count;                 /**< 0..CANOPY_CAN_ACCEPT_MAX */
+    uint16_t mask_count;            /**< 0..CANOPY_CAN_ACCEPT_MAX; both together at most that. */
+    bool everything;                /**< Every data and remote frame, whatever the ids: for tools that watch. */
+    bool error_frames;              /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
     const canopy_can_mask_t *masks; /**< With bit 31 in each mask. Lives as long. NULL when mask_count is 0. */
     const struct canopy_can_acceptance *next; /**< The list continues there; NULL: it ends. */
 } canopy_can_acceptance_t;

@@ -27,12 +27,12 @@
 
 /** A message that the controller receives. Constant. */
 typedef struct {
-    uint32_t id;           /**< Arbitration id. */
-    uint32_t mask;         /**< Of one of the canopy_bus_t.rx_masked: the bits of the id that count; `id` has no other. */
-    uint16_t length;       /**< Bytes; fewer are refused. */
-    uint8_t more;          /**< Bytes beyond `length` that a frame may have, which nobody reads; more are refused. */
-    uint8_t flags;         /**< CANOPY_CAN_EXTENDED, CANOPY_CAN_FD as the frame must have them. */
-    int32_t data_id;       /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
+    uint32_t id;     /**< Arbitration id. */
+    uint32_t mask;   /**< Of one of the canopy_bus_t.rx_masked: the bits of the id that count; `id` has no other. */
+    uint16_t length; /**< Bytes; fewer are refused. */
+    uint8_t more;    /**< Bytes beyond `length` that a frame may have, which nobody reads; more are refused. */
+    uint8_t flags;   /**< CANOPY_CAN_EXTENDED, CANOPY_CAN_FD as the frame must have them. */
+    int32_t data_id; /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
     canopy_time_t timeout; /**< [us] after which the message is stale; 0: never. */
     /**
      * Takes the values of `length` bytes into the input image.
