@@ -34,10 +34,18 @@ include("${CMAKE_CURRENT_LIST_DIR}/Python.cmake") # CANOPY_PYTHON
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH CANOPY_SOURCE_DIR)
 file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
      "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
+     "${CANOPY_SOURCE_DIR}/host_tools/canopy/bus/*.py"
      "${CANOPY_SOURCE_DIR}/host_tools/canopy/tree/*.py"
      "${CANOPY_SOURCE_DIR}/runtime/include/canopy/nodes.def")
 # A property: a variable would be known only where this file was included first.
 set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
+
+# The overlay beside a DBC, if there is one; one that comes or goes configures again.
+function(canopy_overlay_of DBC RESULT)
+  cmake_path(REMOVE_EXTENSION DBC LAST_ONLY OUTPUT_VARIABLE stem)
+  file(GLOB found CONFIGURE_DEPENDS "${stem}.overlay.toml")
+  set(${RESULT} "${found}" PARENT_SCOPE)
+endfunction()
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
@@ -55,6 +63,7 @@ function(canopy_add_application NAME)
   cmake_path(ABSOLUTE_PATH APP_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(ABSOLUTE_PATH APP_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   cmake_path(GET APP_DBC FILENAME dbc_name)
+  canopy_overlay_of("${APP_DBC}" overlay)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
@@ -98,7 +107,7 @@ function(canopy_add_application NAME)
     COMMAND "${CANOPY_PYTHON}" -I -m canopy compile # -I: the folder `canopy` of a build is no package
             "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
             --period-ms "${APP_PERIOD_MS}" --output "${folder}" --depfile "${folder}.d" ${options}
-    DEPENDS "${APP_TREE}" "${APP_DBC}" ${compiler}
+    DEPENDS "${APP_TREE}" "${APP_DBC}" ${overlay} ${compiler}
     DEPFILE "${folder}.d" # the files that the tree includes
     COMMENT "canopy compile ${NAME}"
     VERBATIM)

@@ -13,6 +13,7 @@ function(canopy_add_codec NAME)
     message(FATAL_ERROR "canopy_add_codec(${NAME}): DBC is missing, or unknown arguments: ${CODEC_UNPARSED_ARGUMENTS}")
   endif()
   cmake_path(ABSOLUTE_PATH CODEC_DBC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+  canopy_overlay_of("${CODEC_DBC}" overlay)
   cmake_path(GET CODEC_DBC STEM stem)
   canopy_c_name("${stem}" stem)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${NAME}")
@@ -23,7 +24,7 @@ function(canopy_add_codec NAME)
   add_custom_command(
     OUTPUT "${folder}/${stem}_codec.c" "${folder}/${stem}_codec.h"
     COMMAND "${CANOPY_PYTHON}" -m canopy codec "${CODEC_DBC}" --output "${folder}" ${options}
-    DEPENDS "${CODEC_DBC}" ${CANOPY_COMPILER_SOURCES}
+    DEPENDS "${CODEC_DBC}" ${overlay} ${CANOPY_COMPILER_SOURCES}
     COMMENT "canopy codec ${NAME}"
     VERBATIM)
   add_library(${NAME} STATIC "${folder}/${stem}_codec.c" "${folder}/${stem}_codec.h")

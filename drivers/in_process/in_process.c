@@ -43,7 +43,7 @@ static int receive(void *context, canopy_can_frame_t *frame)
     frame->time = self->now - sensor->age;
     frame->id = message->id;
     frame->flags = message->flags;
-    frame->length = message->length;
+    frame->length = (uint8_t)message->length; /* no more than a frame's: init() looks */
     memcpy(frame->data, sensor->data, message->length);
     if (message->data_id != CANOPY_E2E_NONE) {
         canopy_e2e_protect((uint16_t)message->data_id, sensor->counter, frame->data, frame->length);
@@ -73,6 +73,9 @@ canopy_error_t canopy_in_process_init(canopy_in_process_t *self, const canopy_ap
     if (self == NULL || app == NULL || app->bus == NULL || (sensors == NULL && app->bus->rx_count > 0u) ||
         count < app->bus->rx_count) {
         return CANOPY_ERROR_ARGUMENT;
+    }
+    if (app->bus->transport_count > 0u) {
+        return CANOPY_ERROR_UNSUPPORTED; /* a message of several packets is no frame */
     }
     *self = (canopy_in_process_t){.app = *app, .world = world, .sensors = sensors};
     for (uint16_t index = 0; index < app->bus->rx_count; index++) {

@@ -17,6 +17,7 @@ SUBCOMMANDS = {
     "model": ("canopy.tree.model_cli", "Write the declarations that tree files lack, guessed from use."),
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
+    "dbc": ("canopy.bus.cli", "Write the overlay of a DBC, and see what can be made of it."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
     "verify": ("canopy.verify.cli", "Prove what a tree guarantees, given a model of its leaves."),
     "plot": ("canopy.plot.cli", "Draw what a tree does to a plant, given a model of its leaves."),

@@ -3,21 +3,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
-from decimal import Decimal
 
-from cantools.database.can import Database
-from cantools.database.can import Message as DbcMessage
-from cantools.database.can import Signal as DbcSignal
-from cantools.database.errors import DecodeError
-
-from canopy.compiler.dbc_file import check_timing, parse_dbc
+from canopy.bus.decode import IdTable, UndecodableError, decimals, physical, raw_values
+from canopy.compiler.bus_model import Bus, Message, Signal
+from canopy.compiler.bus_reader import E2E_SIGNALS, read_messages
+from canopy.compiler.dbc_file import hash_of, read_bus_files
 from canopy.compiler.errors import CompileError
-from canopy.files import FileError, read_bytes
 from canopy.model import Model, ModelError
-
-_CYCLES_TO_TIMEOUT = 5  # a message without GenMsgTimeoutTime is stale after so many of its cycles
 
 
 @dataclass(frozen=True)
@@ -50,8 +43,8 @@ class Reading:
 class _Watched:
     """One message, and what was last seen of it."""
 
-    message: DbcMessage
-    signals: tuple[DbcSignal, ...]
+    message: Message
+    signals: tuple[Signal, ...]
     sent: bool
     timeout: float | None
     values: dict[str, float | str] | None = None
@@ -68,32 +61,29 @@ class SignalTable:
             ModelError: The DBC cannot be read, or has no message of a name that the model gives.
         """
         self.refused = 0
-        self._watched: dict[int, _Watched] = {}
-        database = load_database(model)
-        for name in model.receive + model.send:
-            try:
-                message = database.get_message_by_name(name)
-            except KeyError:
-                raise ModelError(f"{model.path}: bus: {model.dbc.name} has no message {name}") from None
-            self._watched[message.frame_id] = _watch(message, name in model.send)
+        bus = load_bus(model)
+        by_name = {message.name: message for message in bus.messages}
+        watched = [by_name[name] for name in dict.fromkeys(model.receive + model.send)]
+        self._ids = IdTable(tuple(watched))
+        self._watched = {message.name: _watch(message, message.name in model.send) for message in watched}
 
-    def feed(self, identifier: int, data: bytes, now: float) -> bool:
-        """Takes one data frame that was seen at `now` [s]; True when it was a message of the table."""
-        watched = self._watched.get(identifier)
-        if watched is None:
+    def feed(self, identifier: int, data: bytes, now: float, *, extended: bool | None = None) -> bool:
+        """Takes one data frame that was seen at `now` [s]; True when it was a message of the table.
+
+        Without `extended` an id of more than 11 bits is an extended one, and a smaller one is tried as both.
+        """
+        kinds = (identifier > 0x7FF, True) if extended is None else (extended,)
+        found = next((message for kind in kinds if (message := self._ids.find(identifier, kind)) is not None), None)
+        if found is None:
             return False
-        if len(data) != watched.message.length:
-            self.refused += 1
-            return False
+        watched = self._watched[found.name]
         try:
-            decoded = watched.message.decode_simple(data)
-        except DecodeError:  # e.g. an unknown multiplexer value
+            raw = raw_values(found, data)
+        except UndecodableError:  # another length, or an unknown multiplexer value
             self.refused += 1
             return False
         watched.values = {
-            signal.name: _as_written(signal, decoded[signal.name])
-            for signal in watched.signals
-            if signal.name in decoded
+            signal.name: physical(signal, raw[signal.name]) for signal in watched.signals if signal.name in raw
         }
         watched.at = now
         return True
@@ -104,50 +94,33 @@ class SignalTable:
 
     def value(self, message: str, signal: str) -> float | str | None:
         """The newest value of one signal; None when it was not seen yet or is not in the table."""
-        for watched in self._watched.values():
-            if watched.message.name == message and watched.values is not None:
-                return watched.values.get(signal)
-        return None
+        watched = self._watched.get(message)
+        return None if watched is None or watched.values is None else watched.values.get(signal)
 
 
-def load_database(model: Model) -> Database:
-    """The DBC beside a model.
+def load_bus(model: Model) -> Bus:
+    """The controller's messages, by the bus description beside its model, overlay included.
 
     Raises:
-        ModelError: It cannot be read.
+        ModelError: It cannot be read, is another one than the model was made with, or lacks a message.
     """
-    used = {*model.receive, *model.send}
     try:
-        data = read_bytes(model.dbc)
-    except FileError as error:
-        raise ModelError(f"{model.dbc}: {error.problem}") from error
-    if model.dbc_hash not in (None, hashlib.sha256(data).hexdigest()[:16]):
-        raise ModelError(f"{model.dbc}: is not the DBC that {model.path.name} was written with: build again")
-    try:
-        dbc = parse_dbc(model.dbc, data, strict=False)
-        for message in dbc.database.messages:
-            if message.name in used:
-                check_timing(dbc, message)
+        if model.dbc_hash not in (None, hash_of(read_bus_files(model.dbc))):
+            raise ModelError(
+                f"{model.dbc}: it, or its overlay, is not what {model.path.name} was written with: build again"
+            )
+        return read_messages(model.dbc, only=tuple({*model.receive, *model.send}))
     except CompileError as error:
         raise ModelError(f"{error.place}: {error.message}") from error
-    database: Database = dbc.database
-    return database
 
 
-def _watch(message: DbcMessage, sent: bool) -> _Watched:
-    protected = message_attribute(message, "E2EDataId", -1) >= 0
-    signals = tuple(s for s in message.signals if not (protected and s.name.startswith("E2E_")))
-    timeout_ms = message_attribute(message, "GenMsgTimeoutTime", 0) or _CYCLES_TO_TIMEOUT * (message.cycle_time or 0)
-    return _Watched(message, signals, sent, timeout_ms / 1000 if timeout_ms else None)
+def _watch(message: Message, sent: bool) -> _Watched:
+    protected = message.data_id is not None
+    signals = tuple(s for s in message.signals if not (protected and s.name in E2E_SIGNALS))
+    return _Watched(message, signals, sent, message.timeout_us / 1e6 if message.timeout_us else None)
 
 
-def message_attribute(message: DbcMessage, name: str, default: int) -> int:
-    """The value of a message's attribute, or the default where neither it nor the DBC gives one."""
-    attributes = message.dbc.attributes if message.dbc is not None else {}
-    return int(attributes[name].value) if attributes and name in attributes else default
-
-
-def _read(watched: _Watched, signal: DbcSignal, now: float) -> Reading:
+def _read(watched: _Watched, signal: Signal, now: float) -> Reading:
     seen = watched.values is not None
     age = now - watched.at if seen else None
     return Reading(
@@ -155,22 +128,8 @@ def _read(watched: _Watched, signal: DbcSignal, now: float) -> Reading:
         signal=signal.name,
         sent=watched.sent,
         value=watched.values.get(signal.name) if watched.values is not None else None,
-        unit=signal.unit or "",
-        decimals=_decimals(signal),
+        unit=signal.unit,
+        decimals=decimals(signal),
         age=age,
         stale=age is not None and watched.timeout is not None and age > watched.timeout,
     )
-
-
-def _as_written(signal: DbcSignal, value: object) -> float | str:
-    """The value as one would write it: 49.3, not 49.300000000000004."""
-    if isinstance(value, int):
-        return value
-    if isinstance(value, float):
-        return value if signal.is_float else round(value, _decimals(signal))
-    return str(value)
-
-
-def _decimals(signal: DbcSignal) -> int:
-    exponents = (Decimal(str(number)).normalize().as_tuple().exponent for number in (signal.scale, signal.offset))
-    return max(0, *(-exponent for exponent in exponents if isinstance(exponent, int)))

@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "bus_parts.h"
+
 #define MS UINT32_C(1000) /* [us] */
 
 /** Order of the table: standard ids before extended ones, and behind all the driver's error frames: no message is one. */
@@ -17,11 +19,17 @@ static uint32_t rank_at(const canopy_bus_t *bus, uint16_t index)
     return rank(bus->rx[index].id, bus->rx[index].flags);
 }
 
+/** How many messages are one id each; the masked ones are behind them. */
+static uint16_t exact_count(const canopy_bus_t *bus)
+{
+    return (uint16_t)(bus->rx_count - bus->rx_masked);
+}
+
 /** The message with this rank; `rx_count`: there is none. */
 static uint16_t search(const canopy_bus_t *bus, uint32_t wanted)
 {
     uint16_t low = 0;
-    uint16_t high = bus->rx_count;
+    uint16_t high = exact_count(bus);
 
     while (low < high) {
         uint16_t middle = (uint16_t)((low + high) / 2u);
@@ -32,19 +40,19 @@ static uint16_t search(const canopy_bus_t *bus, uint32_t wanted)
             high = middle;
         }
     }
-    return low < bus->rx_count && rank_at(bus, low) == wanted ? low : bus->rx_count;
+    return low < exact_count(bus) && rank_at(bus, low) == wanted ? low : bus->rx_count;
 }
 
 /**
  * As search(). Frames that wait at the same time come in the order of their ids, so the next message of the table is a good
  * guess, in each cycle from the first one on.
  */
-static uint16_t find(canopy_bus_state_t *self, uint32_t wanted)
+static uint16_t find_exact(canopy_bus_state_t *self, uint32_t wanted)
 {
     const canopy_bus_t *bus = self->bus;
     uint16_t index = self->expected;
 
-    if (index >= bus->rx_count || rank_at(bus, index) != wanted) {
+    if (index >= exact_count(bus) || rank_at(bus, index) != wanted) {
         index = search(bus, wanted);
     }
     if (index < bus->rx_count) {
@@ -53,19 +61,42 @@ static uint16_t find(canopy_bus_state_t *self, uint32_t wanted)
     return index;
 }
 
+/** The first message of whose id only a part counts, that the frame can be. */
+static uint16_t find_masked(const canopy_bus_t *bus, const canopy_can_frame_t *frame)
+{
+    const uint8_t form = CANOPY_CAN_EXTENDED | CANOPY_CAN_ERROR;
+    uint16_t index = exact_count(bus);
+
+    if ((frame->flags & form) != CANOPY_CAN_EXTENDED) {
+        return bus->rx_count;
+    }
+    while (index < bus->rx_count && (frame->id & bus->rx[index].mask) != bus->rx[index].id) {
+        index++;
+    }
+    return index;
+}
+
+static uint16_t find(canopy_bus_state_t *self, const canopy_can_frame_t *frame)
+{
+    uint16_t index = find_exact(self, rank(frame->id, frame->flags));
+
+    return index < self->bus->rx_count ? index : find_masked(self->bus, frame);
+}
+
 static bool form_fits(const canopy_rx_message_t *message, const canopy_can_frame_t *frame)
 {
     const uint8_t form = CANOPY_CAN_EXTENDED | CANOPY_CAN_FD | CANOPY_CAN_REMOTE;
 
-    return (frame->flags & form) == message->flags && frame->length == message->length;
+    return (frame->flags & form) == message->flags && frame->length >= message->length &&
+           frame->length <= message->length + message->more;
 }
 
-uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_t length)
+uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint16_t length)
 {
     uint8_t result = (uint8_t)(((unsigned)check << 3) | ((unsigned)check >> 5));
 
     result ^= (uint8_t)(id & 0xFFu);
-    for (uint8_t byte = 0; byte < length; byte++) {
+    for (uint16_t byte = 0; byte < length; byte++) {
         result ^= data[byte];
     }
     return result;
@@ -88,40 +119,63 @@ static void note_arrival(canopy_rx_state_t *state, const canopy_rx_message_t *me
     state->received = age < CANOPY_AGE_MAX || message->timeout == 0u;
 }
 
-void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
+/** Notes that something has come with the id of a message. */
+static void note_taken(canopy_bus_state_t *self, uint16_t index)
 {
-    uint16_t index = find(self, rank(frame->id, frame->flags));
-    const canopy_rx_message_t *message;
-    canopy_rx_state_t *state;
-
-    if (index == self->bus->rx_count) {
-        canopy_count(&self->counters.unknown_id);
-        return;
-    }
-    message = &self->bus->rx[index];
-    state = &self->rx[index];
     self->taken++;
-    state->taken = true;
-    if (!form_fits(message, frame)) {
-        canopy_count(&self->counters.wrong_form);
-        return;
-    }
-    self->check = canopy_bus_check(self->check, frame->id, frame->data, frame->length);
+    self->rx[index].taken = true;
+}
+
+static void take_content(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content,
+                         canopy_time_t now)
+{
+    const canopy_rx_message_t *message = &self->bus->rx[index];
+    canopy_rx_state_t *state = &self->rx[index];
+
+    self->check = canopy_bus_check(self->check, content->id, content->data, content->length);
     if (message->data_id != CANOPY_E2E_NONE) {
         canopy_e2e_result_t result =
-            canopy_e2e_check(&state->e2e, (uint16_t)message->data_id, frame->data, frame->length);
+            canopy_e2e_check(&state->e2e, (uint16_t)message->data_id, content->data, (uint8_t)content->length);
 
         if (result != CANOPY_E2E_OK) {
             canopy_count(result == CANOPY_E2E_WRONG_CRC ? &self->counters.wrong_crc : &self->counters.wrong_sequence);
             return;
         }
     }
-    if (!message->decode(self->input, frame->data)) {
+    if (!message->decode(self->input, content->data)) {
         canopy_count(&self->counters.out_of_range);
         return;
     }
     canopy_count(&self->counters.accepted);
-    note_arrival(state, message, age_in_ms(now - frame->time), now);
+    note_arrival(state, message, age_in_ms(now - content->time), now);
+}
+
+void canopy_bus_take(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content, canopy_time_t now)
+{
+    note_taken(self, index);
+    take_content(self, index, content, now);
+}
+
+void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
+{
+    const canopy_bus_content_t content = {
+        .time = frame->time, .data = frame->data, .id = frame->id, .length = frame->length};
+    uint16_t index;
+
+    if (canopy_transport_take(self, frame, now)) {
+        return;
+    }
+    index = find(self, frame);
+    if (index == self->bus->rx_count) {
+        canopy_count(&self->counters.unknown_id);
+        return;
+    }
+    note_taken(self, index);
+    if (!form_fits(&self->bus->rx[index], frame)) {
+        canopy_count(&self->counters.wrong_form);
+        return;
+    }
+    take_content(self, index, &content, now);
 }
 
 /** What a replay must know of a message in this tick goes into the check. */

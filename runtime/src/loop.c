@@ -29,14 +29,24 @@ static bool is_complete(const canopy_loop_config_t *config)
 
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
            app->bus_state != NULL && app->input != NULL && app->output != NULL &&
-           (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->rx_max > 0u && app->frame_us > 0u;
+           (app->rx != NULL || app->bus->rx_count == 0u) &&
+           ((app->transports != NULL && app->transport_data != NULL) || app->bus->transport_count == 0u) &&
+           app->tx != NULL && app->rx_max > 0u && app->frame_us > 0u;
 }
 
 static void start_bus(const canopy_app_t *app)
 {
-    *app->bus_state = (canopy_bus_state_t){.bus = app->bus, .input = app->input, .output = app->output, .rx = app->rx};
+    *app->bus_state = (canopy_bus_state_t){.bus = app->bus,
+                                           .input = app->input,
+                                           .output = app->output,
+                                           .rx = app->rx,
+                                           .transports = app->transports,
+                                           .transport_data = app->transport_data};
     for (uint16_t index = 0; index < app->bus->rx_count; index++) {
         app->rx[index] = (canopy_rx_state_t){0};
+    }
+    for (uint16_t index = 0; index < app->bus->transport_count; index++) {
+        app->transports[index] = (canopy_transport_state_t){0};
     }
 }
 

@@ -10,14 +10,17 @@ Scales are worked out once, when the DBC is read: a frame is made in whole numbe
 from __future__ import annotations
 
 from collections.abc import Mapping
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
 import can
-from cantools.database.can import Database, Message, Signal
 
-from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
+from canopy.bus.source import SourceMessage, SourceSignal
+from canopy.compiler import dbc_file
+from canopy.compiler.dbc_file import Dbc
+from canopy.compiler.errors import CompileError
+from canopy.compiler.limits import DATA_ID, RAW, TIME_MS
 from canopy_sim.e2e import Checker, Protector
 
 REFUSALS = ("flags", "length", "crc", "repeated", "sequence", "range", "version")
@@ -47,34 +50,28 @@ _LIMITS = {
 }
 
 
-def attribute(database: Database, owner: Message | Signal, name: str, otherwise: int) -> int:
-    """An integer attribute of a message or signal, else its default in the DBC, else `otherwise`.
+def attribute(dbc: Dbc, name: str, otherwise: int, message: SourceMessage, signal: SourceSignal | None = None) -> int:
+    """A whole number that the DBC or its overlay gives a message or signal, else `otherwise`.
 
     Raises:
         DescriptionError: It is not a whole number, or not one that the runtime can have.
     """
-    value = None
-    if owner.dbc is not None and name in owner.dbc.attributes:
-        value = owner.dbc.attributes[name].value
-    elif database.dbc is not None and name in database.dbc.attribute_definitions:
-        value = database.dbc.attribute_definitions[name].default_value
-    if value is None:
-        return otherwise
     try:
-        return whole(value, _LIMITS[name], f"{name} of {owner.name}", Place(""))
+        value = dbc_file.attribute(dbc, name, _LIMITS[name], message, signal)
     except CompileError as error:
         raise DescriptionError(error.message) from None
+    return otherwise if value is None else value
 
 
-def _exact(number: float | None) -> Fraction:
+def _exact(number: Decimal) -> Fraction:
     """The decimal number as the DBC writes it: 0.1 is a tenth."""
-    return Fraction(str(number))
+    return Fraction(number)
 
 
 class _Field:
     """One signal in whole numbers: where its bits are, and how a physical value becomes a raw one."""
 
-    def __init__(self, signal: Signal) -> None:
+    def __init__(self, signal: SourceSignal) -> None:
         self.name = signal.name
         self.start = signal.start
         self.mask = 2**signal.length - 1
@@ -98,14 +95,14 @@ class _Field:
         return min(max(step, self.low), self.high)
 
 
-def _fields(message: Message) -> list[_Field]:
+def _fields(message: SourceMessage) -> list[_Field]:
     """The message's signals.
 
     Raises:
         DescriptionError: One is of a kind that the robot does not send or take.
     """
     for signal in message.signals:
-        if signal.byte_order != "little_endian" or signal.is_float or signal.multiplexer_ids or signal.is_multiplexer:
+        if not signal.little_endian or signal.is_float or signal.branches or signal.is_multiplexer:
             raise DescriptionError(f"{message.name}.{signal.name} must be a plain whole number, Intel byte order")
         if _exact(signal.scale) <= 0:
             raise DescriptionError(f"{message.name}.{signal.name} must have a scale above 0")
@@ -115,32 +112,32 @@ def _fields(message: Message) -> list[_Field]:
 class _FrameLayout:
     """What both directions need of a message."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         try:
-            self._message = database.get_message_by_name(name)
-        except KeyError:
-            raise DescriptionError(f"no message {name}") from None
+            self._message = dbc.message(name)
+        except CompileError as error:
+            raise DescriptionError(error.message) from None
         self.name = name
         self.arbitration_id: int = self._message.frame_id
-        self.cycle = attribute(database, self._message, "GenMsgCycleTime", 0) / 1e3
+        self.cycle = attribute(dbc, "GenMsgCycleTime", 0, self._message) / 1e3
         """Cycle time [s]; 0: not cyclic."""
-        data_id = attribute(database, self._message, "E2EDataId", -1)
+        data_id = attribute(dbc, "E2EDataId", -1, self._message)
         self._data_id = None if data_id < 0 else data_id
         wanted = signals | (E2E_SIGNALS if self._data_id is not None else set())
         missing = sorted(wanted - {signal.name for signal in self._message.signals})
         if missing:
             raise DescriptionError(f"message {name} has no signal {', '.join(missing)}")
         self._fields = _fields(self._message)
-        self._is_extended, self._is_fd = self._message.is_extended_frame, self._message.is_fd
+        self._is_extended, self._is_fd = self._message.is_extended, self._message.is_fd
         self._length: int = self._message.length
 
 
 class Outgoing(_FrameLayout):
     """A message that the robot sends."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         """`signals` are those that frame() will be given; a DescriptionError says what the DBC lacks."""
-        super().__init__(database, name, signals)
+        super().__init__(dbc, name, signals)
         self._protector = None if self._data_id is None else Protector(self._data_id)
 
     def frame(self, values: Mapping[str, Fraction | int]) -> can.Message:
@@ -164,11 +161,11 @@ class Outgoing(_FrameLayout):
 class Incoming(_FrameLayout):
     """A message that the robot obeys."""
 
-    def __init__(self, database: Database, name: str, signals: set[str]) -> None:
+    def __init__(self, dbc: Dbc, name: str, signals: set[str]) -> None:
         """`signals` are those that the robot reads; a DescriptionError says what the DBC lacks."""
-        super().__init__(database, name, signals)
+        super().__init__(dbc, name, signals)
         self._checker = None if self._data_id is None else Checker(self._data_id)
-        timeout = attribute(database, self._message, "GenMsgTimeoutTime", 0) / 1e3
+        timeout = attribute(dbc, "GenMsgTimeoutTime", 0, self._message) / 1e3
         self.timeout: float | None = timeout or TIMEOUT_IN_CYCLES * self.cycle or None
         """How long an accepted frame stays fresh [s]; None: for ever."""
 
@@ -201,11 +198,11 @@ class Incoming(_FrameLayout):
 class CommandMessage(Incoming):
     """A command: signals whose values are those of the plant, each with a safe one."""
 
-    def __init__(self, database: Database, name: str, modes: Mapping[str, Any]) -> None:
+    def __init__(self, dbc: Dbc, name: str, modes: Mapping[str, Any]) -> None:
         """Reads the message.
 
         Args:
-            database: The DBC.
+            dbc: The DBC.
             name: The message's.
             modes: By signal: an IntEnum of the plant, whose names the signal's value table must have with the same
                 numbers (the table may have fewer); None for a plain number.
@@ -213,19 +210,19 @@ class CommandMessage(Incoming):
         Raises:
             DescriptionError: Where the DBC's table and safe value do not fit them.
         """
-        super().__init__(database, name, set(modes))
+        super().__init__(dbc, name, set(modes))
         self.safe: dict[str, int] = {}
         """Safe value by signal: what is obeyed while no command is fresh."""
         for signal_name, wanted in modes.items():
-            signal = self._message.get_signal_by_name(signal_name)
-            safe = attribute(database, signal, "GenSigInactiveValue", 0)
+            signal = self._message.signal(signal_name)
+            safe = attribute(dbc, "GenSigInactiveValue", 0, self._message, signal)
             if wanted is not None:
                 _check_modes(f"{name}.{signal_name}", signal, safe, wanted)
             self.safe[signal_name] = safe
 
 
-def _check_modes(where: str, signal: Signal, safe: int, wanted: Any) -> None:
-    described = {str(text): int(value) for value, text in (signal.choices or {}).items()}
+def _check_modes(where: str, signal: SourceSignal, safe: int, wanted: Any) -> None:
+    described = {str(text): int(value) for value, text in signal.choices.items()}
     known = {mode.name: mode.value for mode in wanted}
     if not described or not described.items() <= known.items():
         raise DescriptionError(f"values of {where} are {described}, the robot's are {known}")

@@ -9,9 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import can
-from cantools.database.can import Database
 
-from canopy.compiler.dbc_file import load_dbc
+from canopy.compiler.dbc_file import Dbc, load_dbc
 from canopy.compiler.errors import CompileError
 from canopy.live.trace_model import MESSAGES, VERSION
 from canopy_sim.frames import CommandMessage, DescriptionError, FrameRefusedError, Outgoing
@@ -55,26 +54,26 @@ class HeartBeat:
 class RobotMessages:
     """All messages of the robot."""
 
-    def __init__(self, database: Database, trace: int) -> None:
+    def __init__(self, dbc: Dbc, trace: int) -> None:
         """A DescriptionError says what the DBC lacks. `trace`: the controller's first trace id."""
-        names = {message.name for message in database.messages}
+        names = {message.name for message in dbc.messages}
         self.is_whole = "UpperCommand" in names
         """The DBC has what the whole robot needs, not only Examples 4 and 5."""
         self.sensors: dict[str, tuple[Sensor, Outgoing]] = {}
         for sensor in SENSORS:
             if sensor.is_needed or self.is_whole:
-                outgoing = Outgoing(database, sensor.message, sensor.needed(self.is_whole))
+                outgoing = Outgoing(dbc, sensor.message, sensor.needed(self.is_whole))
                 if outgoing.cycle <= 0:
                     raise DescriptionError(f"message {sensor.message} needs a GenMsgCycleTime: it is sent cyclically")
                 self.sensors[sensor.message] = (sensor, outgoing)
         self.battery = self.sensors["Battery"][1]
         self.posture = self.sensors["Posture"][1]
-        self.simulation_step = Outgoing(database, "SimulationStep", {"Step"})
-        self.power_command = CommandMessage(database, "PowerCommand", {"Mode": PowerMode})
-        self.posture_command = CommandMessage(database, "PostureCommand", {"Mode": PostureMode})
-        self.upper_command = CommandMessage(database, "UpperCommand", UPPER) if self.is_whole else None
+        self.simulation_step = Outgoing(dbc, "SimulationStep", {"Step"})
+        self.power_command = CommandMessage(dbc, "PowerCommand", {"Mode": PowerMode})
+        self.posture_command = CommandMessage(dbc, "PostureCommand", {"Mode": PostureMode})
+        self.upper_command = CommandMessage(dbc, "UpperCommand", UPPER) if self.is_whole else None
         self.tick = HeartBeat(trace)
-        self.known_ids = {message.frame_id for message in database.messages} | self.tick.trace_ids
+        self.known_ids = {message.frame_id for message in dbc.source.messages} | self.tick.trace_ids
         """Ids of the whole DBC, and of the trace."""
 
 
@@ -85,10 +84,10 @@ def load_messages(dbc: Path, trace: int = DEFAULT_TRACE) -> RobotMessages:
         DescriptionError: The file cannot be read, is no DBC, or not one of this robot.
     """
     try:
-        database: Database = load_dbc(dbc).database
+        read = load_dbc(dbc)
     except CompileError as error:
         raise DescriptionError(f"{error.place}: {error.message}") from error
     try:
-        return RobotMessages(database, trace)
+        return RobotMessages(read, trace)
     except DescriptionError as error:
         raise DescriptionError(f"{dbc}: {error}") from None

@@ -78,7 +78,7 @@ static void send(void *context)
     self->timer.due = self->controller.world->now + self->period;
     for (uint8_t index = 0; !self->silent && index < message_count(self); index++) {
         const canopy_rx_message_t *message = &self->app->bus->rx[index];
-        canopy_can_frame_t frame = {.id = message->id, .flags = message->flags, .length = message->length};
+        canopy_can_frame_t frame = {.id = message->id, .flags = message->flags, .length = (uint8_t)message->length};
 
         controller_abort(&self->controller, index);
         note_sent(self);

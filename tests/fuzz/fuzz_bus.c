@@ -19,7 +19,7 @@ static void take_frame(canopy_can_frame_t *frame, canopy_time_t now)
     const canopy_rx_message_t *message = &nao_home_app.bus->rx[take8(&input) % nao_home_app.bus->rx_count];
     uint8_t kind = take8(&input);
 
-    *frame = (canopy_can_frame_t){.id = message->id, .flags = message->flags, .length = message->length};
+    *frame = (canopy_can_frame_t){.id = message->id, .flags = message->flags, .length = (uint8_t)message->length};
     frame->time = kind % 4u == 0u ? now - take32(&input) : now; /* old, or just now, or yet to come */
     if (kind % 8u == 0u) {
         frame->id = take32(&input);

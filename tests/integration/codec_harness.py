@@ -19,7 +19,9 @@ _FLAGS = """
 WARNINGS = _FLAGS.split()
 # The Arm compiler comes without a C library: the firmware tests' string.h, for memcpy and its like.
 BARE_LIBC = ROOT / "tests" / "firmware" / "support" / "libc"
-VALUES_MAX = 512
+INCLUDE = f"-I{ROOT / 'runtime' / 'include'}"
+VALUES_MAX = 2048
+BYTES_MAX = 1785
 
 
 def as_int64(value: int) -> int:
@@ -49,6 +51,8 @@ def codec_harness(bus: Bus) -> str:
             lines += [f"    values[{place}] = {_get(signal, f'm.{signal.c_name}')};"]
             lines += [f"    has[{place}] = {f'm.{signal.has_name}' if signal.has_name else 'true'};"]
         lines += ["    return result;", "}"]
+        if message.name not in bus.sent:
+            continue
         lines += [f"int encode_{number}(const int64_t *values, uint8_t *data, size_t size)", "{"]
         lines += [f"    {name}_t m;", f"    {name}_init(&m);", "    (void)values;"]
         for place, signal in enumerate(message.signals):
@@ -113,7 +117,7 @@ class Library:
         self._library = ctypes.CDLL(str(path))
         self._values = (ctypes.c_int64 * VALUES_MAX)()
         self._has = (ctypes.c_bool * VALUES_MAX)()
-        self._data = (ctypes.c_uint8 * 64)()
+        self._data = (ctypes.c_uint8 * BYTES_MAX)()
 
     def decode(self, number: int, message: Message, data: bytes) -> tuple[int, dict[str, int]]:
         """(result, raw value of each signal that is there, by its name in the DBC)."""
@@ -125,6 +129,6 @@ class Library:
         """(how many values were limited, the frame). What `values` does not have is 0."""
         for place, signal in enumerate(message.signals):
             self._values[place] = as_int64(values.get(signal.name, 0))
-        self._data[:] = [0xA5] * 64
-        result = getattr(self._library, f"encode_{number}")(self._values, self._data, ctypes.c_size_t(64))
+        self._data[:] = [0xA5] * BYTES_MAX
+        result = getattr(self._library, f"encode_{number}")(self._values, self._data, ctypes.c_size_t(BYTES_MAX))
         return result, bytes(self._data[: message.length])

@@ -193,8 +193,8 @@ def test_a_deep_tree_compiles(tmp_path: Path) -> None:
         ('BA_ "GenSigInactiveValue" SG_ 512 Mode 0;', 'BA_ "GenSigInactiveValue" SG_ 512 Mode 9;', ["its range"]),
         (" SG_ E2E_Counter : 8|4@1+ (1,0) [0|14] \"\" Robot\n SG_ Mode", " SG_ Mode", ["needs the signal E2E_Counter"]),
         ("BO_ 512 PowerCommand:", "BO_ 512 CanopyTick:", ["node 'Controller' sends 'CanopyTick'", "--trace 0x600"]),
-        ("BU_: Controller Robot", "BU_: Robot", ["no node 'Controller'", "known here: Robot"]),
-        ("BO_ 256 Battery: 8 Robot", "BO_ 256 Battery", ["not a DBC that can be read"]),
+        ("Controller", "Pilot", ["no node 'Controller'", "known here: Pilot, Robot"]),
+        ("BO_ 256 Battery: 8 Robot", "BO_ 256 Battery", ["BO_ cannot be read here: BO_ 256 Battery"]),
     ],
 )  # fmt: skip
 def test_a_wrong_dbc_is_named(tmp_path: Path, old: str, new: str, texts: list[str]) -> None:

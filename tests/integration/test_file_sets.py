@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from canopy.cli import main
 from canopy.files import write_files
 from canopy.model import ModelError, load_model
-from canopy.signals import load_database
+from canopy.signals import load_bus
 from canopy.watch import Watch
 from integration.language import ROOT, WARNINGS
 from integration.test_files import TREE, model
@@ -185,8 +185,8 @@ def test_what_must_be_new_is_never_replaced(tmp_path: Path) -> None:
 
 def test_the_tools_refuse_a_model_and_a_dbc_of_two_runs(tmp_path: Path) -> None:
     path = model(tmp_path)
-    assert load_database(load_model(path)) is not None
+    assert load_bus(load_model(path)) is not None
     with (tmp_path / "nao.dbc").open("a") as file:
         file.write("\n")
-    with pytest.raises(ModelError, match=r"is not the DBC that room\.model\.json was written with"):
+    with pytest.raises(ModelError, match=r"is not what room\.model\.json was written with"):
         Watch(load_model(path))

@@ -132,8 +132,8 @@ def test_an_option_of_the_trace_has_limits(tmp_path: Path, option: str, value: s
     [
         ("[0|100]", "[0|1e99999999]", ["the number 1e99999999 is too long"]),
         ("[0|100]", "[-1e99999999|100]", ["the number -1e99999999 is too long"]),
-        ("[0|100]", "[0|1e400]", ["signal 'A.X' has the maximum inf"]),
-        ("(1,0)", "(1e400,0)", ["signal 'A.X' has the scale inf"]),
+        ("[0|100]", "[0|1e400]", ["signal 'A.X' has the maximum 1e+400"]),
+        ("(1,0)", "(1e400,0)", ["signal 'A.X' has the scale 1e+400"]),
         ("(1,0)", "(1e-200,0)", ["signal 'A.X' has the scale 1e-200"]),
         ("(1,0)", "(1,1e200)", ["signal 'A.X' has the offset 1e+200"]),
         ("(1,0)", f"({'9' * 500},0)", ["the number 99999999999999999999… is too long"]),
@@ -151,10 +151,10 @@ def test_a_signal_out_of_its_limits_is_refused_at_its_line(
     expect_refused(tmp_path, run(tmp_path, dbc=dbc), f"b.dbc:{line}", *texts)
 
 
-def test_branches_of_a_multiplexer_are_counted_before_they_are_made(tmp_path: Path) -> None:
+def test_branches_of_a_multiplexer_are_ranges_however_many_they_are(tmp_path: Path) -> None:
     dbc = DBC.replace("SG_ Y :", 'SG_ Z m0 : 48|8@1+ (1,0) [0|0] "" Controller\n SG_ Y M :').replace("16|8", "16|32")
     dbc += "SG_MUL_VAL_ 2 Z Y 0-4294967295;\n"
-    expect_refused(tmp_path, run(tmp_path, dbc=dbc), f"b.dbc:{len(dbc.splitlines())}", "signal 'Z'", "1048576")
+    assert run(tmp_path, dbc=dbc).exit_code == 0
 
 
 def test_such_numbers_in_comments_are_none(tmp_path: Path) -> None:

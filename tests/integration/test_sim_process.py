@@ -345,7 +345,7 @@ def test_wrong_command_lines_end_with_2(options: list[str], text: str, bus: str)
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("BO_ 528 PostureCommand", "BO_ 528 OtherCommand", "no message PostureCommand"),
+        ("BO_ 528 PostureCommand", "BO_ 528 OtherCommand", "no message 'PostureCommand'"),
         (" SG_ HeadX ", " SG_ HeadZ ", "no signal HeadX"),
         ('2 "DriveToCharger"', '2 "Drive"', "PowerCommand.Mode"),
         ('"GenSigInactiveValue" SG_ 512 Mode 0', '"GenSigInactiveValue" SG_ 512 Mode 7', "is 7"),

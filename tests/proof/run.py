@@ -107,6 +107,7 @@ def all_runs(every_inner: bool) -> list[Run]:
         for part in (
             "tree",
             "bus",
+            "transport",
             "can_state",
             "loop",
             "loop_run",

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from canopy.bus.cantools_view import cantools_message
 from canopy.cli import main
 from canopy.compiler.errors import CompileError
 from canopy.replay.program import read_sent, run_program
@@ -58,9 +59,9 @@ def test_the_program_does_what_refutes_a_claim(
     run_program(BUILD / "examples" / "nao" / program, (), file, tmp_path / "sent")
     subject = subject_of(tree)
     assert subject.bus is not None
-    message = subject.bus.source.database.get_message_by_name(command)
+    message = cantools_message(subject.bus.source.message(command))
     sent = [one for one in read_sent(tmp_path / "sent") if one.arbitration_id == message.frame_id]
-    modes = [str(message.decode(bytes(one.data))["Mode"]) for one in sent]
+    modes = [str(message.decode_simple(bytes(one.data))["Mode"]) for one in sent]
     found = verify(subject, next(one for one in subject.plant.claims if one.name == claim))
     acting = [visit for visit in found.trace if visit.status == RUNNING]
     assert len(acting) > 18

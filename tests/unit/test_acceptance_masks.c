@@ -138,6 +138,28 @@ static uint32_t random_number(void)
     return seed >> 8;
 }
 
+static void test_listed_sets_stay_as_they_are(void)
+{
+    static const canopy_can_mask_t groups[] = {
+        {0x00F00400u | EXT, 0x03FFFF00u | EXT}, /* a J1939 parameter group from anyone */
+        {0x00FEF100u | EXT, 0x03FFFF00u | EXT},
+    };
+    static const uint32_t own[] = {0x18F00421u | EXT, 0x100};
+    const canopy_can_acceptance_t acceptance = {.ids = own, .count = 2, .masks = groups, .mask_count = 2};
+
+    TEST_ASSERT_EQUAL(3,
+                      canopy_can_acceptance_masks(&acceptance, masks, MOST, &exact)); /* the first id is in a group */
+    TEST_ASSERT_TRUE(exact);
+    TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 3, 0x0CF00400u | EXT));
+    TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 3, 0x18FEF1FEu | EXT));
+    TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 3, 0x100));
+    TEST_ASSERT_FALSE(canopy_can_masks_accept(masks, 3, 0x18FEF2FEu | EXT));
+    TEST_ASSERT_EQUAL(2, canopy_can_acceptance_masks(&acceptance, masks, 2, &exact));
+    TEST_ASSERT_FALSE(exact); /* the groups have become one set, which has others, too */
+    TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 2, 0x0CF00400u | EXT));
+    TEST_ASSERT_TRUE(canopy_can_masks_accept(masks, 2, 0x18FEF1FEu | EXT));
+}
+
 enum { STANDARD, BOTH, EXTENDED, CLOSE, KINDS };
 
 static void fill(uint16_t count, unsigned kind)
@@ -202,6 +224,7 @@ int main(void)
     RUN_TEST(test_everything_and_nothing);
     RUN_TEST(test_lists_go_on_in_others);
     RUN_TEST(test_bad_arguments_are_refused);
+    RUN_TEST(test_listed_sets_stay_as_they_are);
     RUN_TEST(test_random_sets);
     return UNITY_END();
 }

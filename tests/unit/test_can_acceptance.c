@@ -115,6 +115,26 @@ static void test_filter_is_checked(void)
     TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.ids = ids, .count = 513}));
 }
 
+static void test_sets_of_ids_pass(void)
+{
+    static const uint32_t ids[] = {0x100};
+    static const canopy_can_mask_t groups[] = {
+        {0x00F00400u | CANOPY_CAN_ACCEPT_EXTENDED, 0x03FFFF00u | CANOPY_CAN_ACCEPT_EXTENDED}};
+    const canopy_can_acceptance_t acceptance = {.ids = ids, .count = 1, .masks = groups, .mask_count = 1};
+
+    TEST_ASSERT_TRUE(accepts(&acceptance, 0x100, 0));
+    TEST_ASSERT_TRUE(accepts(&acceptance, 0x0CF00400, CANOPY_CAN_EXTENDED));
+    TEST_ASSERT_TRUE(accepts(&acceptance, 0x18F00421, CANOPY_CAN_EXTENDED));
+    TEST_ASSERT_FALSE(accepts(&acceptance, 0x18F00521, CANOPY_CAN_EXTENDED));
+    TEST_ASSERT_FALSE(accepts(&acceptance, 0x421, 0));
+    TEST_ASSERT_FALSE(accepts(&acceptance, 0x18F00421, CANOPY_CAN_EXTENDED | CANOPY_CAN_ERROR));
+    TEST_ASSERT_TRUE(canopy_can_acceptance_is_valid(&acceptance));
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.masks = groups}));
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(&(canopy_can_acceptance_t){.mask_count = 1}));
+    TEST_ASSERT_FALSE(canopy_can_acceptance_is_valid(
+        &(canopy_can_acceptance_t){.ids = ids, .count = 1, .masks = groups, .mask_count = CANOPY_CAN_ACCEPT_MAX}));
+}
+
 static void test_ids_have_11_or_29_bits(void)
 {
     TEST_ASSERT_TRUE(is_valid(0x7FF, 0, 8));
@@ -169,6 +189,7 @@ int main(void)
     RUN_TEST(test_listed_ids_are_accepted_and_the_formats_are_told_apart);
     RUN_TEST(test_error_frames_are_accepted_on_request_whatever_their_id);
     RUN_TEST(test_filter_is_checked);
+    RUN_TEST(test_sets_of_ids_pass);
     RUN_TEST(test_ids_have_11_or_29_bits);
     RUN_TEST(test_lengths_are_those_that_a_dlc_can_say);
     RUN_TEST(test_flags_fit_the_format);

@@ -58,6 +58,13 @@ static const canopy_tx_message_t tx = {
 static const canopy_bus_t bus = {
     .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
+static const canopy_transport_t transport = {0};
+static const canopy_bus_t packet_bus = {.rx = &rx,
+                                        .rx_count = 1,
+                                        .transports = &transport,
+                                        .transport_count = 1,
+                                        .reset_output = reset_output,
+                                        .set_cycle = set_cycle};
 static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_trace_value_t value = {.kind = CANOPY_TRACE_U8};
 static canopy_trace_config_t trace;
@@ -178,6 +185,21 @@ static void a_bus_without_messages_needs_no_state_for_them(void)
     app.bus = &silent_bus;
     app.rx = NULL;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+}
+
+static void messages_of_several_packets_need_room(void)
+{
+    canopy_transport_state_t state = {.size = 1};
+    uint8_t data = 0;
+
+    app.bus = &packet_bus;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &config));
+    app.transports = &state;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &config));
+    app.transport_data = &data;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    TEST_ASSERT_EQUAL_UINT16(0, state.size);
+    TEST_ASSERT_EQUAL_PTR(&data, bus_state.transport_data);
 }
 
 static void hooks_may_be_missing(void)
@@ -358,6 +380,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(an_incomplete_configuration_is_refused);
     RUN_TEST(a_bus_without_messages_needs_no_state_for_them);
+    RUN_TEST(messages_of_several_packets_need_room);
     RUN_TEST(hooks_may_be_missing);
     RUN_TEST(the_hook_after_a_cycle_can_end_the_loop);
     RUN_TEST(a_cycle_longer_than_32_bits_is_told_as_the_largest);

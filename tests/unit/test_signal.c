@@ -141,6 +141,26 @@ static void constants_round_to_the_nearest_raw_value(void)
     TEST_ASSERT_EQUAL_INT32(140, CANOPY_RAW(int32_t, 100, 1.0, -40.0));
 }
 
+static void fixed_point_values_become_the_nearest_raw_one(void)
+{
+    /* 0.05 a bit, from -1.00 on, in hundredths. */
+    TEST_ASSERT_EQUAL_INT64(20, canopy_raw_of_fixed(0, 5, -100, 0, 255));
+    TEST_ASSERT_EQUAL_INT64(20, canopy_raw_of_fixed(2, 5, -100, 0, 255));
+    TEST_ASSERT_EQUAL_INT64(21, canopy_raw_of_fixed(3, 5, -100, 0, 255));
+    TEST_ASSERT_EQUAL_INT64(0, canopy_raw_of_fixed(-100, 5, -100, 0, 255));
+    TEST_ASSERT_EQUAL_INT64(0, canopy_raw_of_fixed(INT64_MIN, 5, -100, 0, 255));
+    TEST_ASSERT_EQUAL_INT64(255, canopy_raw_of_fixed(INT64_MAX, 5, -100, 0, 255));
+    /* Halves go away from 0. */
+    TEST_ASSERT_EQUAL_INT64(3, canopy_raw_of_fixed(5, 2, 0, -9, 9));
+    TEST_ASSERT_EQUAL_INT64(-3, canopy_raw_of_fixed(-5, 2, 0, -9, 9));
+    TEST_ASSERT_EQUAL_INT64(-1, canopy_raw_of_fixed(-4, 3, 0, -9, 9));
+    /* A scale below 0 turns the range round. */
+    TEST_ASSERT_EQUAL_INT64(-3, canopy_raw_of_fixed(5, -2, 0, -9, 9));
+    TEST_ASSERT_EQUAL_INT64(3, canopy_raw_of_fixed(-5, -2, 0, -9, 9));
+    TEST_ASSERT_EQUAL_INT64(-9, canopy_raw_of_fixed(INT64_MAX, -2, 0, -9, 9));
+    TEST_ASSERT_EQUAL_INT64(9, canopy_raw_of_fixed(INT64_MIN, -2, 0, -9, 9));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -149,5 +169,6 @@ int main(void)
     RUN_TEST(a_child_of_a_parallel_ticked_and_halted_in_one_tick_keeps_what_it_wrote);
     RUN_TEST(a_child_that_is_halted_and_not_ticked_leaves_what_its_handler_wrote);
     RUN_TEST(constants_round_to_the_nearest_raw_value);
+    RUN_TEST(fixed_point_values_become_the_nearest_raw_one);
     return UNITY_END();
 }

@@ -63,16 +63,6 @@ static uint32_t cost(const canopy_can_mask_t *a, const canopy_can_mask_t *b)
     return size_of(&both) > apart ? size_of(&both) - apart : 0u;
 }
 
-bool canopy_can_masks_accept(const canopy_can_mask_t *masks, uint16_t count, uint32_t id)
-{
-    for (uint16_t index = 0; index < count; index++) {
-        if (((masks[index].id ^ id) & masks[index].mask) == 0u) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /** Takes a set more among `most`, which are all used: merges the two that cost least, of all and the new one. */
 static void squeeze(canopy_can_mask_t *masks, uint16_t most, const canopy_can_mask_t *more)
 {
@@ -97,15 +87,17 @@ static void squeeze(canopy_can_mask_t *masks, uint16_t most, const canopy_can_ma
     }
 }
 
+static bool is_part_of(const canopy_can_mask_t *set, const canopy_can_mask_t *other)
+{
+    return (other->mask & ~set->mask) == 0u && ((set->id ^ other->id) & other->mask) == 0u;
+}
+
 /** Drops sets that lie within another one. @return how many are left */
 static uint16_t tidy(canopy_can_mask_t *masks, uint16_t count)
 {
     for (uint16_t a = 0; a < count; a++) {
         for (uint16_t b = 0; b < count; b++) {
-            bool within =
-                a != b && (masks[b].mask & ~masks[a].mask) == 0u && ((masks[a].id ^ masks[b].id) & masks[b].mask) == 0u;
-
-            if (within) {
+            if (a != b && is_part_of(&masks[a], &masks[b])) {
                 masks[a--] = masks[--count]; /* looked at next */
                 break;
             }
@@ -114,11 +106,12 @@ static uint16_t tidy(canopy_can_mask_t *masks, uint16_t count)
     return count;
 }
 
-static bool is_listed(const canopy_can_acceptance_t *acceptance, uint32_t id)
+/** Is the set within one that the list has as it is? */
+static bool is_listed_whole(const canopy_can_acceptance_t *acceptance, const canopy_can_mask_t *set)
 {
     for (const canopy_can_acceptance_t *list = acceptance; list != NULL; list = list->next) {
-        for (uint16_t index = 0; index < list->count; index++) {
-            if (list->ids[index] == id) {
+        for (uint16_t index = 0; index < list->mask_count; index++) {
+            if (is_part_of(set, &list->masks[index])) {
                 return true;
             }
         }
@@ -136,8 +129,11 @@ static bool is_exact(const canopy_can_acceptance_t *acceptance, const canopy_can
     if ((set->mask & EXTENDED) == 0u) {
         return false;
     }
+    if (is_listed_whole(acceptance, set)) {
+        return true;
+    }
     do { /* every value of the free bits */
-        if (looked++ == CANOPY_CAN_ACCEPT_MAX || !is_listed(acceptance, set->id | part)) {
+        if (looked++ == CANOPY_CAN_ACCEPT_MAX || !canopy_can_is_listed(acceptance, set->id | part)) {
             return false;
         }
         part = (part - bits) & bits;
@@ -185,6 +181,9 @@ int canopy_can_acceptance_masks(const canopy_can_acceptance_t *acceptance, canop
             if (!canopy_can_masks_accept(masks, count, set.id)) {
                 count = add(masks, count, most, &set);
             }
+        }
+        for (uint16_t index = 0; index < list->mask_count; index++) {
+            count = add(masks, count, most, &list->masks[index]);
         }
     }
     *exact = true;

@@ -39,6 +39,11 @@ static bool set_filters(int descriptor, const canopy_can_acceptance_t *acceptanc
             filters[count].can_mask = CAN_EFF_FLAG | (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
             count++;
         }
+        for (uint16_t index = 0; index < list->mask_count; index++) {
+            filters[count].can_id = list->masks[index].id;
+            filters[count].can_mask = list->masks[index].mask;
+            count++;
+        }
     }
     return set_option(descriptor, SOL_CAN_RAW, CAN_RAW_FILTER, filters, count * sizeof filters[0]);
 }

@@ -80,7 +80,8 @@ struct canopy_in_process {
  * @param count      places in it; at least app->bus->rx_count
  * @param world      NULL: none
  * @param with_trace false: no trace frames are made, which saves their time
- * @return CANOPY_OK, or CANOPY_ERROR_ARGUMENT. O(nodes + messages).
+ * @return CANOPY_OK, CANOPY_ERROR_ARGUMENT, or CANOPY_ERROR_UNSUPPORTED: the bus has messages of several packets.
+ *         O(nodes + messages).
  */
 canopy_error_t canopy_in_process_init(canopy_in_process_t *self, const canopy_app_t *app,
                                       canopy_in_process_sensor_t *sensors, uint16_t count, const canopy_world_t *world,

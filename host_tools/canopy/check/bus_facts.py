@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
+from canopy.bus.source import ReversedRange, SourceSignal
 from canopy.compiler.bus_model import Bus, Message, Signal
-from canopy.compiler.dbc_file import attribute
-from canopy.compiler.dbc_text import ReversedRange, dbc_id
+from canopy.compiler.dbc_file import attribute, attribute_place, number
 from canopy.compiler.errors import Place
-from canopy.compiler.limits import DATA_ID, TIME_MS
+from canopy.compiler.limits import DATA_ID
 
 
 class BusFacts:
@@ -19,41 +18,40 @@ class BusFacts:
     def __init__(self, bus: Bus, period_ms: int) -> None:
         self.bus = bus
         self.period_ms = period_ms
-        self._text = bus.source.text
-        self._written: dict[str, Any] = {message.name: message for message in bus.source.database.messages}
+        self._dbc = bus.source
 
-    def signals(self) -> Iterator[tuple[Message, Signal, Any]]:
-        """(message, signal, cantools' signal) of all that the node receives and sends."""
+    def signals(self) -> Iterator[tuple[Message, Signal, SourceSignal]]:
+        """(message, signal, the signal as it is written) of all that the node receives and sends."""
         for message in self.bus.messages:
             for signal in message.signals:
-                yield message, signal, self._written[message.name].get_signal_by_name(signal.name)
+                yield message, signal, self._dbc.message(message.name).signal(signal.name)
 
     def place(self, message: Message, signal: Signal | None = None) -> Place:
         """The line of a message, or of one of its signals."""
-        written = self._written[message.name]
-        return self._text.message(written) if signal is None else self._text.signal(written, signal)
+        written = self._dbc.message(message.name)
+        return written.place if signal is None else written.signal(signal.name).place
 
     def attribute_place(self, name: str, message: Message) -> Place:
         """The line that gives a message an attribute."""
-        return self._text.attribute(name, self._written[message.name])
+        return attribute_place(self._dbc, name, self._dbc.message(message.name))
 
     def timeout_ms(self, message: Message) -> int:
-        """GenMsgTimeoutTime as it is written; 0: not at all."""
-        return attribute(self.bus.source, "GenMsgTimeoutTime", TIME_MS, self._written[message.name]) or 0
+        """GenMsgTimeoutTime as it is written, rounded down; 0: not at all."""
+        value = number(self._dbc, "GenMsgTimeoutTime", self._dbc.message(message.name))
+        return int(value or 0)
 
     def data_ids(self) -> Iterator[tuple[int, str, Place]]:
         """(E2EDataId, name, place) of every protected message of the bus, whoever sends it."""
-        for name, message in self._written.items():
-            data_id = attribute(self.bus.source, "E2EDataId", DATA_ID, message)
+        for message in self._dbc.messages:
+            data_id = attribute(self._dbc, "E2EDataId", DATA_ID, message)
             if data_id is not None and data_id >= 0:
-                yield data_id, name, self._text.attribute("E2EDataId", message)
+                yield data_id, message.name, attribute_place(self._dbc, "E2EDataId", message)
 
     def reversed_ranges(self) -> Iterator[tuple[str, ReversedRange]]:
         """Ranges of multiplexers' values, of the node's messages, whose ends are swapped; with the message's name."""
-        names = {dbc_id(self._written[message.name]): message.name for message in self.bus.messages}
-        for found in self._text.reversed_ranges:
-            if found.message_id in names:
-                yield names[found.message_id], found
+        for message in self.bus.messages:
+            for found in self._dbc.message(message.name).reversed_ranges:
+                yield message.name, found
 
     def comments(self) -> Iterator[tuple[list[Place], str]]:
         """The comments of the node's messages and signals, and the places that they speak for."""

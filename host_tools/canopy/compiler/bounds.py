@@ -113,13 +113,13 @@ def _wait(bus: Bus, index: int, bitrate: int, others: Others) -> Fraction | None
 
 def _age(message: Message, bitrate: int, others: Others) -> int | None:
     """Its sender's frame may leave at once the one time, and wait as long as it can the next time."""
-    if not message.cycle_ms:
+    if not message.cycle_us:
         return None
     share = Fraction(others.load_percent, 100)
     longest = Fraction(_LONGEST_BITS * 1_000_000, bitrate)
     own = _time_us(message, bitrate)
     wait = ((1 + others.burst) * max(longest, own) + own) / (1 - share) - own
-    return message.cycle_ms * 1000 + _ceil(wait)
+    return message.cycle_us + _ceil(wait)
 
 
 def _inputs(bus: Bus, bitrate: int, others: Others) -> tuple[InputBound, ...]:
@@ -127,14 +127,14 @@ def _inputs(bus: Bus, bitrate: int, others: Others) -> tuple[InputBound, ...]:
         InputBound(
             message.name,
             _age(message, bitrate, others),
-            message.timeout_ms * 1000 if message.timeout_ms else None,
+            message.timeout_us or None,
         )
         for message in bus.receive
     )
 
 
 def _outputs(bus: Bus, bitrate: int, others: Others) -> tuple[OutputBound, ...]:
-    timeouts = [message.timeout_ms * 1000 for message in bus.receive if message.timeout_ms]
+    timeouts = [message.timeout_us for message in bus.receive if message.timeout_us]
     result = []
     for index, message in enumerate(bus.send):
         exact = _wait(bus, index, bitrate, others)
@@ -176,7 +176,7 @@ def late_outputs(bounds: Bounds) -> list[OutputBound]:
 
 def stale_inputs(bus: Bus, bounds: Bounds) -> list[InputBound]:
     """Inputs that may get stale although their sender keeps to its cycle."""
-    timeouts = {message.name: message.timeout_ms * 1000 for message in bus.receive}
+    timeouts = {message.name: message.timeout_us for message in bus.receive}
     return [
         bound
         for bound in bounds.inputs

@@ -113,8 +113,9 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) ->
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 4, *[u32] * 8, u8, u16])
+    bus_state = struct_size([*[pointer] * 6, *[u32] * 8, u8, u16])
     trace_state = struct_size([pointer, pointer, u32, u32, *[u16] * 8, *[u8] * 4])
+    transport = struct_size([u64, u64, u16, u16, u8, u8])
     rx_state = struct_size([u64, *[u8] * 6, u16])
     tx_slot = struct_size([array(u64, 2), *[u32] * 5, *[u8] * 4])
     tx_mailbox = struct_size([u64, u32, u16, u8])
@@ -147,11 +148,13 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) ->
             image_out,
             entries_size(table),
             array(rx_state, max(1, len(bus.receive))),
+            array(transport, len(bus.transported)),
             array(u16, max(1, table.words, images.words)),
             array(u32, -(-nodes // 4)),
             *([array(u32, -(-nodes // 4))] if trace is not None else []),
             *([array(u32, trace.slots)] if trace is not None and trace.slots else []),
             array(u8, max(1, 2 * sum(message.length for message in bus.send))),
+            array(u8, sum(message.length for message in bus.transported)),
             *(array(u8, len(use.nodes)) for use in table.leaves if use.leaf.reasons),
             images.memory,
         ]
@@ -204,9 +207,10 @@ def flash_bytes(table: Table, bus: Bus, trace: Trace | None) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(_ports_size(use.leaf) * len(use.nodes) for use in table.users)
-    rx = struct_size([u32, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
+    rx = struct_size([u32, u32, u16, u8, u8, u32, u64, pointer, pointer])[0] * len(bus.receive)
     tx = struct_size([u32, u8, u8, u32, u16, u16, u64, pointer])[0] * len(bus.send)
-    accepted = 4 * len(bus.receive) + 12
+    masked = sum(not message.is_exact for message in bus.receive)
+    accepted = 4 * (len(bus.receive) + masked) + 20 + (16 + 4 * len(bus.transported) if bus.transported else 0)
     tables = accepted + NODE_FLASH * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
     numbers = 4 * (len(table.parameters) + len(table.scripts) + len(table.bindings.texts))
     traced = 8 * trace.slots + struct_size([u32, u8, u8, u8, u32, *[u16] * 5, pointer])[0] if trace is not None else 0

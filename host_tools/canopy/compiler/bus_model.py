@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from canopy.bus.doubts import Remark
     from canopy.compiler.dbc_file import Dbc
+    from canopy.compiler.errors import CompileError
 
 FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """What a CAN FD frame can carry (ISO 11898-1, DLC 0..15)."""
@@ -168,9 +170,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Message:
-    """A message. `signals` are those that the application sees. Times in ms; 0: none.
+    """A message. `signals` are those that the application sees. Times in us; 0: none.
 
-    `length` is that of the frame: for CAN FD the next one that exists, with zeros at the end.
+    `length` is that of the frame: for CAN FD the next one that exists, with zeros at the end. Of `id` only the bits of
+    `mask` count when a frame is received; the others are 0 in a message that the application receives.
     """
 
     name: str
@@ -179,11 +182,37 @@ class Message:
     extended: bool
     fd: bool
     length: int
-    cycle_ms: int
-    timeout_ms: int
+    cycle_us: int
+    timeout_us: int
     data_id: int | None
     signals: tuple[Signal, ...]
     comment: str
+    mask: int
+    j1939: bool = False
+    longest: int = 0
+    """Frames of `length` to so many bytes are taken."""
+    receive_only: CompileError | None = None
+    """Why the message can be received, and not sent."""
+
+    @property
+    def cycle_ms(self) -> int:
+        """The cycle time where it is a whole number of ms, as that of every output is; else 0."""
+        return 0 if self.cycle_us % 1000 else self.cycle_us // 1000
+
+    @property
+    def is_exact(self) -> bool:
+        """Does every bit of the id count?"""
+        return self.mask == (0x1FFFFFFF if self.extended else 0x7FF)
+
+    @property
+    def pgn(self) -> int:
+        """J1939: its parameter group number."""
+        return (self.id & (0x03FF0000 if (self.id >> 16) & 0xFF < 240 else 0x03FFFF00)) >> 8
+
+    @property
+    def is_transported(self) -> bool:
+        """J1939: does it come in several packets?"""
+        return self.j1939 and self.length > 8 and not self.fd
 
     @property
     def multiplexed(self) -> tuple[Signal, ...]:
@@ -211,11 +240,18 @@ class Bus:
     send: tuple[Message, ...]
     source: Dbc = field(repr=False, compare=False)
     load: tuple[tuple[int, bool, bool, float], ...] = ()
+    remarks: tuple[Remark, ...] = field(default=(), repr=False, compare=False)
+    """What the user should know of these messages, and of those that are left out."""
 
     @property
     def messages(self) -> tuple[Message, ...]:
         """Every message that there is code for, each once."""
         return tuple({message.name: message for message in (*self.receive, *self.send)}.values())
+
+    @property
+    def transported(self) -> tuple[Message, ...]:
+        """Received messages of several packets."""
+        return tuple(message for message in self.receive if message.is_transported)
 
     @property
     def received(self) -> frozenset[str]:

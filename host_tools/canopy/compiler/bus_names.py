@@ -8,6 +8,7 @@ in the DBC). The generated header shows the DBC's name beside each.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable
 
 from canopy.compiler.bus_model import Enumerator, Message, Signal
@@ -27,11 +28,12 @@ _TAKEN = frozenset(_WORDS.split())
 _IMAGE_MEMBERS = ("now", "can_state", "overload", "written", "saturated", "halting")
 _BUS_WORDS = (
     "bus", "bus_h", "codec_h", "input", "output", "acceptance", "rx_messages", "tx_messages", "tx_bytes",
-    "output_signals",
+    "output_signals", "transport_bytes",
 )  # fmt: skip
 # What the application's header adds, with the same prefix.
 _APPLICATION_WORDS = ("period_us", "tree_hash", "nodes", "words", "texts")
-_MESSAGE_WORDS = ("id", "length", "extended", "fd", "cycle_ms", "data_id")
+_SIGNAL_WORDS = ("physical", "per_unit", "fixed", "from_fixed")
+_MESSAGE_WORDS = ("id", "mask", "length", "extended", "fd", "cycle_ms", "data_id")
 
 
 class _Names(set[str]):
@@ -57,10 +59,17 @@ def _free(wanted: str, taken: Iterable[_Names], prefix: str = "") -> str:
     return name
 
 
+def _spelled(text: str) -> str:
+    """A text with its signs as words, `Fuse+` as `Fuse plus`, and letters that C does not have by their numbers."""
+    text = re.sub(r"\+", " plus ", text)
+    text = re.sub(r"(?<![A-Za-z0-9])-(?=\w)|(?<=\w)-(?!\w)|^-$", " minus ", text)
+    return re.sub(r"[^\W\d_a-zA-Z]+", lambda found: "_" + "_".join(f"u{ord(c):x}" for c in found[0]) + "_", text)
+
+
 def _enumerators(signal: Signal, stem: str, everything: _Names) -> tuple[Enumerator, ...]:
     result = []
     for value, text in signal.choices:
-        word = snake(text).strip("_") or f"value_{'minus_' if value < 0 else ''}{abs(value)}"
+        word = snake(_spelled(text)).strip("_") or f"value_{'minus_' if value < 0 else ''}{abs(value)}"
         name = _free(f"{stem}_{word}", [everything])
         result.append(Enumerator(value, text, name.upper()))
     return tuple(result)
@@ -70,8 +79,11 @@ def _name_signals(message: Message, everything: _Names) -> Message:
     members = _Names(*_TAKEN)
     named = []
     for signal in message.signals:
-        wanted = snake(signal.name)
+        wanted = snake(_spelled(signal.name))
         c_name = _free(f"{wanted}_" if wanted in _TAKEN else wanted, [members, everything], f"{message.c_name}_")
+        while any(f"{message.c_name}_{c_name}_{word}" in everything for word in _SIGNAL_WORDS):
+            c_name = _free(wanted, [members, everything], f"{message.c_name}_")
+        everything |= {f"{message.c_name}_{c_name}_{word}" for word in _SIGNAL_WORDS}
         named.append(dataclasses.replace(signal, c_name=c_name))
     names = {signal.name: signal.c_name for signal in named}
     for place, signal in enumerate(named):
@@ -93,7 +105,7 @@ def name_messages(messages: tuple[Message, ...]) -> tuple[Message, ...]:
     everything = _Names(*_BUS_WORDS, *_APPLICATION_WORDS)
     named = []
     for message in messages:
-        wanted = snake(message.name)
+        wanted = snake(_spelled(message.name))
         wanted = f"{wanted}_" if wanted in members else wanted
         named.append(dataclasses.replace(message, c_name=_free(wanted, [members, everything])))
     for message in named:

@@ -1,150 +1,158 @@
 # SPDX-License-Identifier: MIT
-"""A DBC as one of its nodes sees it: what it receives and what it sends; or all of it.
+"""A bus as one of its nodes sees it: what it receives and what it sends; or all of it.
 
-Attributes that are read (docs/dbc.md): GenMsgCycleTime, GenMsgTimeoutTime, E2EDataId of messages, GenSigInactiveValue
-of signals.
+Attributes that are read (docs/dbc.md), from the file or its overlay: GenMsgCycleTime, GenMsgTimeoutTime, E2EDataId of
+messages, GenSigInactiveValue of signals.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
-from canopy.compiler.bus_model import FD_LENGTHS, Bus, Message, Signal, float_value
+from canopy.bus.doubts import Remark, doubts, impossible_range, left_out
+from canopy.bus.j1939 import NULL_ADDRESS, SOURCE, TRANSPORT_BYTES
+from canopy.bus.overlay import to_write
+from canopy.bus.soundness import overlap
+from canopy.bus.source import SourceMessage, SourceSignal
+from canopy.compiler.bus_model import FD_LENGTHS, Bus, Message, Signal
 from canopy.compiler.bus_names import name_messages
-from canopy.compiler.dbc_file import Dbc, attribute, check_node, load_dbc, number
-from canopy.compiler.dbc_text import dbc_id
-from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.limits import DATA_ID, EVERY, TIME_MS, count, whole
+from canopy.compiler.bus_outputs import check_outputs
+from canopy.compiler.dbc_file import Dbc, attribute, check_node, load_dbc, load_text, number
+from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.limits import DATA_ID, TIME_MS, count
 from canopy.compiler.names import snake
-from canopy.compiler.signal_reader import is_safe, nearest_allowed, read_signal
+from canopy.compiler.signal_reader import is_safe, nearest_allowed, read_signal, with_safe_value
 from canopy.compiler.trace_layout import MESSAGES as TRACE_MESSAGES
 
 __all__ = ["Bus", "Message", "Signal", "read_bus", "read_messages"]
 
 E2E_SIGNALS = {"E2E_CRC": (0, 8), "E2E_Counter": (8, 4)}
+CYCLES_TO_TIMEOUT = 5
+"""A message without GenMsgTimeoutTime is stale after so many of its cycles."""
 
 
-def _check_e2e(place: Place, message: Any) -> None:
+def _check_e2e(message: SourceMessage) -> None:
+    if message.is_j1939 and message.length > TRANSPORT_BYTES:
+        text = f"message '{message.name}' comes in several packets, and has an E2EDataId: only frames are protected"
+        raise CompileError(message.place, text)
     for name, (start, length) in E2E_SIGNALS.items():
         signal = next((s for s in message.signals if s.name == name), None)
-        if signal is None or (signal.start, signal.length, signal.byte_order) != (start, length, "little_endian"):
+        if signal is None or (signal.start, signal.length, signal.little_endian) != (start, length, True):
             raise CompileError(
-                place,
+                message.place,
                 f"message '{message.name}' has an E2EDataId, so it needs the signal {name} at {start}|{length}@1+",
                 "E2E Profile 11 has its CRC in byte 0 and its counter in the low half of byte 1",
             )
 
 
-def _wire_length(message: Any) -> int:
+def _wire_length(message: SourceMessage) -> int:
     """A CAN FD frame has one of few lengths."""
-    length = int(message.length)
+    length = message.length
     return min((known for known in FD_LENGTHS if known >= length), default=length) if message.is_fd else length
 
 
-def _cycle_ms(dbc: Dbc, message: Any, *, for_codec: bool) -> int:
-    if for_codec:  # it only tells the user: there is no constant for what is no whole number
-        value = number(dbc, "GenMsgCycleTime", message)
-        if value is not None and value % 1:
-            return 0
-    return attribute(dbc, "GenMsgCycleTime", TIME_MS, message) or 0
+def _time_us(dbc: Dbc, name: str, message: SourceMessage) -> int:
+    """A time in ms, which need not be a whole number of them, rounded up to us."""
+    value = number(dbc, name, message) or Fraction(0)
+    if value.denominator == 1 or not 0 < value < TIME_MS.high:
+        return 1000 * (attribute(dbc, name, TIME_MS, message) or 0)
+    return int(-(-1000 * value // 1))
 
 
-def _read_message(dbc: Dbc, message: Any, *, for_codec: bool = False) -> Message:
+def _read_message(dbc: Dbc, message: SourceMessage, *, for_codec: bool = False) -> Message:
+    """The message. What is wrong with its layout is noted in it, too: then it is left out."""
     data_id = attribute(dbc, "E2EDataId", DATA_ID, message)
     hide_e2e = data_id is not None and data_id >= 0 and not for_codec
     if hide_e2e:
-        _check_e2e(dbc.text.message(message), message)
-    cycle = _cycle_ms(dbc, message, for_codec=for_codec)
-    timeout = None if for_codec else attribute(dbc, "GenMsgTimeoutTime", TIME_MS, message)
+        _check_e2e(message)
+    cycle, timeout = (_time_us(dbc, name, message) for name in ("GenMsgCycleTime", "GenMsgTimeoutTime"))
     seen = [signal for signal in message.signals if not (hide_e2e and signal.name in E2E_SIGNALS)]
-    signals = [read_signal(dbc, message, signal) for signal in seen]
+    signals = _read_signals(message, seen)
+    length = _wire_length(message)
     return Message(
         name=message.name,
         c_name=snake(message.name),
         id=message.frame_id,
-        extended=message.is_extended_frame,
+        extended=message.is_extended,
         fd=message.is_fd,
-        length=_wire_length(message),
-        cycle_ms=cycle,
-        timeout_ms=timeout or 5 * cycle,
+        length=length,
+        cycle_us=cycle,
+        timeout_us=timeout or CYCLES_TO_TIMEOUT * cycle,
         data_id=data_id if data_id is not None and data_id >= 0 else None,
         # A multiplexer before the signals that it selects.
-        signals=tuple(sorted(signals, key=lambda signal: len(signal.selectors))),
-        comment=str(message.comment or ""),
+        signals=tuple(
+            sorted((with_safe_value(dbc, message, s) for s in signals), key=lambda signal: len(signal.selectors))
+        ),
+        comment=message.comment,
+        mask=message.mask,
+        j1939=message.is_j1939,
+        longest=max(length, 64 if message.is_fd else 8) if message.may_be_longer else length,
+        receive_only=_receive_only(dbc, message, signals),
     )
 
 
-def _check_frame(place: Place, message: Message) -> None:
-    """Can it be one frame?"""
-    most = 64 if message.fd else 8
-    if message.length > most:
-        raise CompileError(
-            place,
-            f"message '{message.name}' has {message.length} bytes, and a{' CAN FD' if message.fd else ''} frame at "
-            f"most {most}",
-            "" if message.fd else "for CAN FD give it the attribute VFrameFormat StandardCAN_FD or ExtendedCAN_FD",
+def _read_signals(message: SourceMessage, wanted: list[SourceSignal]) -> list[Signal]:
+    """Those of which there can be code; the others are dropped from the message, with the reason."""
+    result = []
+    for signal in wanted:
+        try:
+            result.append(read_signal(message, signal))
+        except CompileError as error:
+            message.drop(signal, error)
+            if message.problem is not None:
+                raise message.problem from error
+    return result
+
+
+def _receive_only(dbc: Dbc, message: SourceMessage, signals: list[Signal]) -> CompileError | None:
+    """Why nobody should send the message: it is not whole, or not clear."""
+    for reason in message.dropped.values():
+        return reason
+    shared = overlap(message)
+    if shared is not None:
+        one, other = shared
+        line = to_write(dbc.path, "leave_out = true", message.name, other)
+        return CompileError(
+            message.signal(other).place, f"signals '{one}' and '{other}' of message '{message.name}' overlap", line
         )
+    ranges = (impossible_range(message.name, signal, message.signal(signal.name)) for signal in signals)
+    return next((wrong for wrong in ranges if wrong is not None), None)
 
 
-def _check_outputs(dbc: Dbc, messages: tuple[Message, ...], period_ms: int) -> None:
-    for message in messages:
-        owner = dbc.database.get_message_by_name(message.name)
-        place = dbc.text.attribute("GenMsgCycleTime", owner)
-        if message.cycle_ms == 0 or message.cycle_ms % period_ms:
-            raise CompileError(
-                place,
-                f"message '{message.name}' is sent every {message.cycle_ms} ms, which is no multiple of the period",
-                f"set GenMsgCycleTime to a multiple of {period_ms} (ms), or change the period",
-            )
-        _check_every(place, message, period_ms)
-        for signal in message.signals:
-            written = owner.get_signal_by_name(signal.name)
-            if number(dbc, "GenSigInactiveValue", owner, written) is None:
-                raise CompileError(
-                    dbc.text.signal(owner, written),
-                    f"output '{message.name}.{signal.name}' has no safe value",
-                    f'add BA_ "GenSigInactiveValue" SG_ {dbc_id(owner)} {signal.name} VALUE; to the DBC',
-                )
-            _check_safe(dbc.text.attribute("GenSigInactiveValue", owner, written), message, signal)
-
-
-def _check_every(place: Place, message: Message, period_ms: int) -> None:
-    """A longer one would become another number of ticks in C, 0 among them."""
-    whole(
-        max(1, message.cycle_ms // period_ms),
-        EVERY,
-        f"GenMsgCycleTime of message '{message.name}', {message.cycle_ms} ms in ticks of {period_ms} ms,",
+def _check_frame(place: Place, message: Message, *, sent: bool) -> None:
+    """Can it be one frame, or several that are put together?"""
+    most = 64 if message.fd else 8
+    if message.length <= most or (message.is_transported and not sent):
+        return
+    if message.is_transported:
+        text = (
+            f"message '{message.name}' has {message.length} bytes: what comes in several packets can be received only"
+        )
+        raise CompileError(place, text, to_do_without(message.name))
+    raise CompileError(
         place,
-        f"at most {EVERY.high * period_ms} ms with this period",
+        f"message '{message.name}' has {message.length} bytes, and a{' CAN FD' if message.fd else ''} frame at "
+        f"most {most}",
+        "" if message.fd else "for CAN FD give it the attribute VFrameFormat StandardCAN_FD or ExtendedCAN_FD",
     )
 
 
-def _check_no_trace(dbc: Dbc, message: Any, node: str) -> None:
+def to_do_without(name: str) -> str:
+    """A help text for a message that the application can do without."""
+    return f"to do without it: write `leave_out = true` for '{name}' in the overlay"
+
+
+def _check_no_trace(message: SourceMessage, node: str) -> None:
     """Until version 2 of the trace its messages stood in the DBC."""
     if message.name.partition("_")[0] in (*TRACE_MESSAGES, "CanopyArrivals"):
         raise CompileError(
-            dbc.text.message(message),
+            message.place,
             f"node '{node}' sends '{message.name}', and the trace's messages are made by the compiler",
             "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600), or another id "
             "that begins eight free ones",
         )
-
-
-def _check_safe(place: Place, message: Message, signal: Signal) -> None:
-    if is_safe(signal):
-        return
-    if signal.is_float:
-        safe, *ends = (f"{float_value(bits, signal.length):g}" for bits in (signal.safe, signal.low, signal.high))
-        allowed = "..".join(ends)
-    else:
-        safe = str(signal.safe)
-        allowed = ", ".join(f"{low}..{high}" if low < high else f"{low}" for low, high in signal.accepted)
-    raise CompileError(
-        place, f"the safe value {safe} of output '{message.name}.{signal.name}' is outside its range: {allowed} (raw)"
-    )
 
 
 def _with_good_safe_values(message: Message) -> Message:
@@ -157,33 +165,63 @@ def _with_good_safe_values(message: Message) -> Message:
 
 
 def _load(dbc: Dbc) -> tuple[tuple[int, bool, bool, float], ...]:
-    """The cyclic messages of every node, for the bus load. Of these a fraction of a millisecond does no harm."""
-    result = []
-    for message in dbc.database.messages:
-        cycle = number(dbc, "GenMsgCycleTime", message) or Decimal(0)
-        if cycle % 1 == 0 or not 0 < cycle < TIME_MS.high:
-            cycle = Decimal(attribute(dbc, "GenMsgCycleTime", TIME_MS, message) or 0)
-        result.append((_wire_length(message), message.is_extended_frame, message.is_fd, float(cycle)))
-    return tuple(result)
+    """The cyclic messages of every node, for the bus load."""
+    return tuple(
+        (_wire_length(message), message.is_extended, message.is_fd, _time_us(dbc, "GenMsgCycleTime", message) / 1000)
+        for message in dbc.messages
+    )
 
 
-def _by_id(database: Any) -> list[Any]:
-    return sorted(database.messages, key=lambda message: (message.is_extended_frame, message.frame_id))
+def _by_id(dbc: Dbc) -> list[SourceMessage]:
+    return sorted(dbc.source.messages, key=lambda message: (message.is_extended, message.frame_id))
+
+
+def _in_order(messages: list[Message]) -> list[Message]:
+    """As canopy_bus_t.rx wants them: by (extended, id); then those of which not all of the id counts.
+
+    Of the latter those of which more bits count come first, for they are tried in this order.
+    """
+    masked = sorted((m for m in messages if not m.is_exact), key=lambda m: (-m.mask.bit_count(), m.id & m.mask))
+    for place, message in enumerate(masked):
+        masked[place] = dataclasses.replace(message, id=message.id & message.mask)
+    return [*(m for m in messages if m.is_exact), *masked]
+
+
+def _check_masks(dbc: Dbc, messages: list[Message]) -> None:
+    """Two messages that the same frame would be, and of which neither is the narrower one."""
+    masked = [message for message in messages if not message.is_exact]
+    for place, message in enumerate(masked):
+        for other in masked[:place]:
+            if message.mask.bit_count() == other.mask.bit_count() and not (
+                (message.id ^ other.id) & message.mask & other.mask
+            ):
+                raise CompileError(
+                    dbc.message(message.name).place,
+                    f"a frame can be both '{other.name}' and '{message.name}': they have one parameter group",
+                    to_write(dbc.path, "source = ADDRESS", message.name),
+                )
 
 
 def _make_bus(
-    path: Path,
     dbc: Dbc,
     node: str,
     receive: list[Message],
     send: list[Message],
+    remarks: list[Remark],
     name: str | None = None,
 ) -> Bus:
     """The bus, with C names, each its own."""
+    path = dbc.path
     for what, messages in (("receives", receive), ("sends", send)):
         count(messages, f"messages that node '{node}' {what}", Place(str(path)))
     known = {message.name: message for message in (*receive, *send)}
     named = {message.name: message for message in name_messages(tuple(known.values()))}
+    for message in known.values():
+        written = dbc.message(message.name)
+        remarks += [Remark(place, text) for place, text in written.notes]
+        remarks += [left_out(problem, "; the message can be received only") for problem in written.dropped.values()]
+        for signal in message.signals:
+            remarks += doubts(message.name, signal, written.signal(signal.name))
     return Bus(
         path=path,
         name=name or snake(path.stem),
@@ -191,7 +229,54 @@ def _make_bus(
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
         source=dbc,
+        remarks=tuple(remarks),
     )
+
+
+def read_sent(dbc: Dbc, message: SourceMessage) -> Message:
+    """An output. Here nothing is left out: others wait for it.
+
+    Raises:
+        CompileError: it cannot be sent.
+    """
+    if message.problem is not None:
+        raise _with_way(message.problem, message)
+    read = _read_message(dbc, message)
+    if message.is_j1939 and not message.mask & SOURCE and message.frame_id & SOURCE == NULL_ADDRESS:
+        text = f"message '{message.name}' is sent, and its id has no source address"
+        raise CompileError(message.place, text, to_write(dbc.path, "source = ADDRESS", message.name))
+    if read.receive_only is not None:
+        reason = read.receive_only
+        wrong = CompileError(reason.place, f"{reason.message}: '{message.name}' cannot be sent so", reason.help_text)
+        raise _with_way(wrong, message)
+    _check_frame(message.place, read, sent=True)
+    return read
+
+
+def _with_way(problem: CompileError, message: SourceMessage) -> CompileError:
+    """The same with one more way out."""
+    ways = [problem.help_text, to_do_without(message.name)]
+    return CompileError(problem.place, problem.message, "; ".join(way for way in ways if way))
+
+
+def _read_received(dbc: Dbc, message: SourceMessage, remarks: list[Remark]) -> list[Message]:
+    """An input, or none where its layout cannot be taken: a leaf that reads it is told so."""
+    read = None
+    if message.problem is None:
+        try:
+            read = _read_message(dbc, message)
+        except CompileError:
+            if message.problem is None:
+                raise
+    if read is not None:
+        try:
+            _check_frame(message.place, read, sent=False)
+        except CompileError as error:
+            message.problem = error
+    if message.problem is not None:
+        remarks.append(left_out(message.problem))
+        return []
+    return [] if read is None else [read]
 
 
 def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> Bus:
@@ -200,25 +285,29 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     `name` is what its C names begin with: the application's, for its tables hold counts of its ticks. Else the file's.
 
     Raises:
-        CompileError: the file cannot be read, has no such node, or has something that cannot be compiled.
+        CompileError: the file cannot be read, has no such node, or has something that the application needs and that
+            cannot be compiled.
     """
-    place = Place(str(path))
     dbc = load_dbc(path)
-    check_node(place, dbc.database, node)
+    check_node(dbc, node)
     receive: list[Message] = []
     send: list[Message] = []
-    for message in _by_id(dbc.database):
-        if node in message.senders:
-            _check_no_trace(dbc, message, node)
-            send.append(_read_message(dbc, message))
-        elif any(node in signal.receivers for signal in message.signals):
-            receive.append(_read_message(dbc, message))
-    for message in receive + send:
-        _check_frame(dbc.text.message(dbc.database.get_message_by_name(message.name)), message)
+    remarks = [left_out(problem) for problem in dbc.source.problems]
+    for message in _by_id(dbc):
+        sent = node in message.senders
+        if sent:
+            _check_no_trace(message, node)
+            send.append(read_sent(dbc, message))
+        elif node in message.receivers or message.has_lost_signals:
+            receive += _read_received(dbc, message, remarks)
+    receive = _in_order(receive)
+    _check_masks(dbc, receive)
     buffers = sum(2 * message.length for message in send)  # places in them: canopy_tx_message_t.place
-    count(buffers, f"bytes of two buffers for each message that node '{node}' sends", place)
-    bus = dataclasses.replace(_make_bus(path, dbc, node, receive, send, name), load=_load(dbc))
-    _check_outputs(dbc, bus.send, period_ms)
+    count(buffers, f"bytes of two buffers for each message that node '{node}' sends", Place(str(path)))
+    packets = sum(message.length for message in receive if message.is_transported)  # canopy_transport_t.place
+    count(packets, f"bytes of messages of several packets that node '{node}' receives", Place(str(path)))
+    bus = dataclasses.replace(_make_bus(dbc, node, receive, send, remarks, name), load=_load(dbc))
+    check_outputs(dbc, bus.send, period_ms)
     return bus
 
 
@@ -226,27 +315,60 @@ def read_messages(path: Path, node: str = "", only: tuple[str, ...] = ()) -> Bus
     """The messages of a DBC for a codec alone: all, or what `node` receives and sends, or those named in `only`.
 
     Signals of the end-to-end protection are signals as all others here; cycle times and safe values are not asked for.
+    What cannot be compiled is left out, unless `only` names it.
 
     Raises:
-        CompileError: the file cannot be read, has no such node or message, or has something that cannot be compiled.
+        CompileError: the file cannot be read, has no such node or message, or nothing of it can be compiled.
     """
-    place = Place(str(path))
-    dbc = load_dbc(path)
+    return _read_for_codecs(load_dbc(path), node, only)
+
+
+def read_text(text: str) -> Bus:
+    """The messages of a DBC that is a text of ours. Raises CompileError as read_messages() does."""
+    return _read_for_codecs(load_text(text), "", ())
+
+
+def _read_for_codecs(dbc: Dbc, node: str, only: tuple[str, ...]) -> Bus:
     if node:
-        check_node(place, dbc.database, node)
-    names = [message.name for message in dbc.database.messages]
+        check_node(dbc, node)
     for name in only:
-        if name not in names:
-            raise CompileError(place, f"no message '{name}'", nearest(name, names))
+        dbc.message(name)
     receive: list[Message] = []
     send: list[Message] = []
-    for message in _by_id(dbc.database):
+    problems = [] if only else list(dbc.source.problems)
+    remarks: list[Remark] = []
+    for message in _by_id(dbc):
         sent = not node or node in message.senders
-        received = not node or any(node in signal.receivers for signal in message.signals)
-        if (sent or received) and (not only or message.name in only):
-            read = _with_good_safe_values(_read_message(dbc, message, for_codec=True))
-            if received:
-                receive.append(read)
-            if sent:
-                send.append(read)
-    return _make_bus(path, dbc, node, receive, send)
+        received = not node or node in message.receivers
+        if not (sent or received) or (only and message.name not in only):
+            continue
+        read = _read_for_codec(dbc, message, required=bool(only))
+        if read is None:
+            problems += [] if message.problem is None else [message.problem]
+            continue
+        if received:
+            receive.append(read)
+        reason = read.receive_only
+        if sent and reason is not None:
+            if message.dropped:
+                continue  # there is a remark for each of its signals
+            text = f"message '{read.name}' gets no encode function: {reason.message}"
+            remarks.append(Remark(reason.place, text, reason.help_text))
+        elif sent:
+            send.append(read)
+    if problems and not receive and not send:
+        raise problems[0]
+    return _make_bus(dbc, node, receive, send, [*map(left_out, problems), *remarks])
+
+
+def _read_for_codec(dbc: Dbc, message: SourceMessage, *, required: bool) -> Message | None:
+    """The message; None: it is left out, with the reason in it."""
+    if message.problem is not None:
+        return None
+    try:
+        return _with_good_safe_values(_read_message(dbc, message, for_codec=True))
+    except CompileError as error:
+        if required:
+            raise
+        message.problem = error
+        return None

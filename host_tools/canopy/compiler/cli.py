@@ -12,6 +12,7 @@ import click
 
 from canopy.compiler.bounds import BURST, LATENCY_US, LOAD_PERCENT, Bounds, Others, refusal
 from canopy.compiler.budget import Budget
+from canopy.compiler.dbc_file import bus_paths, remove_old_overlay
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
@@ -23,7 +24,7 @@ from canopy.compiler.stubs import stubs
 from canopy.compiler.trace import TICKS_DEFAULT, Entries, Trace, TraceOptions
 from canopy.escape import c
 from canopy.escape.json_text import dumps
-from canopy.escape.terminal import echo
+from canopy.escape.terminal import echo, echo_lines
 
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
@@ -374,7 +375,7 @@ def command(
             else {stubs_file: stubs(application.name, application.table, application.bus).encode()}
         )
         if depfile is not None:
-            read = [*application.table.tree.files, dbc]
+            read = [*application.table.tree.files, *bus_paths(dbc)]
             first |= dependencies(depfile, output / f"{application.name}_app.c", read)
     except CompileError as error:
         fail(error)
@@ -383,6 +384,9 @@ def command(
         if most is not None and used > most:
             echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
+    for remark in application.bus.remarks:
+        echo_lines(str(remark), err=True)
+    remove_old_overlay(output / dbc.name, files)
     write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
     print_note(application.table.tree.foreign.note())
     if as_json:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import pairwise
 
 from canopy.compiler.bus_model import INTEGER_LIMITS, Bus, Message, Ranges, Signal, float_value
@@ -272,12 +273,54 @@ def branches(message: Message, *, sending: bool = False) -> tuple[Branch, ...]:
 @emits_c
 def physical_macro(signal: Signal) -> str:
     """C: the body of the macro that makes a raw value of the constant `physical`."""
-    scale, offset = (
-        text if "." in text or "E" in text else f"{text}.0" for text in (str(signal.scale), str(signal.offset))
-    )
+    scale, offset = _real(signal.scale), _real(signal.offset)
     if signal.is_float:
         return f"(({signal.c_type})(((physical) - ({offset})) / ({scale})))"
     return f"CANOPY_RAW({value_type(signal)}, physical, {scale}, {offset})"
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Physical values in fixed point: raw * step + offset, in 1/per_unit of the signal's unit; exact."""
+
+    per_unit: int
+    step: int
+    offset: int
+    c_type: str
+
+
+def fixed_point(signal: Signal) -> Fixed | None:
+    """How physical values of the signal are whole numbers; None: they are the raw ones, or no C integer holds them."""
+    if signal.is_float or signal.is_bool or signal.is_enum or (signal.scale == 1 and signal.offset == 0):
+        return None
+    exponents = [number.as_tuple().exponent for number in (signal.scale, signal.offset)]
+    places = max(0, *(-exponent for exponent in exponents if isinstance(exponent, int)))
+    per_unit = 10**places if places <= 18 else 0
+    step, offset = int(signal.scale * per_unit), int(signal.offset * per_unit)
+    reached = [part for raw in signal.limits for part in (raw, raw * step, raw * step + offset)] + [
+        step,
+        offset,
+        per_unit,
+    ]
+    for c_type in ("int32_t", "int64_t"):
+        low, high = INTEGER_LIMITS[c_type]
+        if per_unit and all(low < value <= high for value in reached):
+            return Fixed(per_unit, step, offset, c_type)
+    return None
+
+
+@emits_c
+def to_physical(signal: Signal) -> str:
+    """C: the body of the macro that makes a double of the raw value `raw`; one rounding where the parts are exact."""
+    fixed = fixed_point(signal)
+    if fixed is None:
+        return f"((double)(raw) * {_real(signal.scale)} + ({_real(signal.offset)}))"
+    return f"(((double)(raw) * {fixed.step}.0 + ({fixed.offset}.0)) / {fixed.per_unit}.0)"
+
+
+def _real(number: Decimal) -> str:
+    text = str(number)
+    return text if "." in text or "E" in text else f"{text}.0"
 
 
 def may_limit(message: Message) -> bool:

@@ -66,6 +66,8 @@ def command(dbc: Path, output: Path, node: str, messages: tuple[str, ...], perio
     except CompileError as error:
         echo_lines(str(error), err=True)
         sys.exit(INPUT_ERROR)
+    for remark in bus.remarks:
+        echo_lines(str(remark), err=True)
     write_or_exit(output, tie(files))
     signals = sum(len(message.signals) for message in bus.messages)
     echo(f"{bus.name}: {len(bus.messages)} messages, {signals} signals: {', '.join(sorted(files))}")

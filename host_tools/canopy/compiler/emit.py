@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import itertools
 import os
 import re
@@ -20,7 +19,7 @@ from canopy.compiler.bounds import Others
 from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import Bus, read_bus
 from canopy.compiler.bus_timing import frame_us, frames_in
-from canopy.compiler.dbc_file import read_dbc
+from canopy.compiler.dbc_file import hash_of, read_bus_files
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.generation import PLACEHOLDER, tie
 from canopy.compiler.image_catalogue import Catalogue
@@ -108,6 +107,11 @@ def _check_leaves(table: Table, bus: Bus) -> None:
             for name in getattr(use.leaf, verb):
                 message, _, signal = name.partition(".")
                 if message not in known:
+                    if message in bus.source.names_left_out:
+                        bus.source.message(message)  # says why
+                    unreadable = bus.source.unreadable(message)
+                    if unreadable is not None:
+                        raise unreadable
                     raise CompileError(
                         use.leaf.place,
                         f"leaf '{use.leaf.id}' {verb} '{name}', which node '{bus.node}' of {bus.path.name} does not "
@@ -117,6 +121,9 @@ def _check_leaves(table: Table, bus: Bus) -> None:
                 owner = next(m for m in bus.receive + bus.send if m.name == message)
                 signals = [s.name for s in owner.signals]
                 if signal and signal not in signals:
+                    reason = bus.source.message(message).dropped.get(signal)
+                    if reason is not None:
+                        raise reason
                     raise CompileError(
                         use.leaf.place, f"message '{message}' has no signal '{signal}'", nearest(signal, signals)
                     )
@@ -206,7 +213,7 @@ def model(application: Application) -> dict[str, object]:
         },
         "bus": {
             "dbc": bus.path.name,
-            "dbc_hash": hashlib.sha256(read_dbc(bus.path)).hexdigest()[:16],
+            "dbc_hash": hash_of(read_bus_files(bus.path)),
             "node": bus.node,
             "receive": [message.name for message in bus.receive],
             "send": [message.name for message in bus.send],
@@ -327,7 +334,7 @@ def render(application: Application) -> dict[str, bytes]:
             if traced
             else {}
         ),
-        application.bus.path.name: read_dbc(application.bus.path),
+        **read_bus_files(application.bus.path),
         f"{name}.model.json": (dumps(model(application), indent=1) + "\n").encode(),
         **tie(files),
     }

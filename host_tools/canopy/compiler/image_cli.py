@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from canopy.compiler.dbc_file import read_dbc
+from canopy.compiler.dbc_file import bus_paths, read_bus_files
 from canopy.compiler.emit import Application, load_application, model
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
@@ -66,10 +66,10 @@ def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: P
         dbc = application.bus.path
         files: dict[str, bytes] = {}
         if with_model:
-            files[dbc.name] = read_dbc(dbc)
+            files |= read_bus_files(dbc)
             content = model(application) | {"trace": image_trace(data, application.table)}
             files[f"{output.stem}.model.json"] = (dumps(content, indent=1) + "\n").encode()
-        read = [*application.table.tree.files, firmware, dbc]
+        read = [*application.table.tree.files, firmware, *bus_paths(dbc)]
         first = dependencies(depfile, output, read) if depfile is not None else {}
     except CompileError as error:
         fail(error)

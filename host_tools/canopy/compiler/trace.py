@@ -245,8 +245,9 @@ def _check_ids(bus: Bus, base: int, extended: bool) -> None:
         raise CompileError(
             place, f"the trace takes the ids 0x{base:X} to 0x{last:X}, which are no CAN ids", "take lower ones"
         )
-    for message in bus.source.database.messages:
-        if message.is_extended_frame == extended and base <= message.frame_id <= last:
+    for message in bus.source.messages:
+        taken = any(not (identifier ^ message.frame_id) & message.mask for identifier in range(base, last + 1))
+        if message.is_extended == extended and taken:
             raise CompileError(
                 place,
                 f"the trace takes the ids 0x{base:X} to 0x{last:X}, and 0x{message.frame_id:X} is '{message.name}' of "

@@ -11,12 +11,14 @@ from typing import Any
 
 from cantools.database.can import Message, Signal
 
+from canopy.bus.cantools_view import cantools_message
+from canopy.compiler.bus_reader import E2E_SIGNALS
 from canopy.compiler.errors import nearest
 from canopy.files import FileError, read_bytes
 from canopy.inprocess.library import DATA_MAX, NONE, EntryPlace, InProcessError, Library
 from canopy.live.codes import Status
 from canopy.model import ModelError, load_model
-from canopy.signals import load_database, message_attribute
+from canopy.signals import load_bus
 
 Value = int | float | str | Fraction
 
@@ -99,7 +101,7 @@ class Application:
         """
         try:
             self.model = load_model(model, traced=False)
-            database = load_database(self.model)
+            bus = load_bus(self.model)
         except ModelError as error:
             raise InProcessError(str(error)) from error
         self.library = Library(library or model.with_name(f"{self.model.application}.so"), trace=trace)
@@ -108,7 +110,9 @@ class Application:
         call = self.library.call
         self._inputs: dict[str, _Input] = {}
         self._outputs: dict[str, tuple[Message, int]] = {}
-        for message in database.messages:
+        self._protected = {message.name for message in bus.messages if message.data_id is not None}
+        for name in dict.fromkeys((*self.model.receive, *self.model.send)):
+            message = cantools_message(bus.source.message(name))
             if message.name in self.model.receive:
                 place = call["receives"](message.frame_id, message.is_extended_frame)
                 self._inputs[message.name] = _Input(message, self._known(place, message))
@@ -260,7 +264,7 @@ class Application:
         if self.library.call["read"](place, data, length) != 0:
             raise InProcessError(f"{message}: the application sends frames of another length: build again")
         decoded = described.decode_simple(data.raw[: described.length], allow_truncated=True)
-        hidden = {"E2E_CRC", "E2E_Counter"} if message_attribute(described, "E2EDataId", -1) >= 0 else set()
+        hidden = set(E2E_SIGNALS) if described.name in self._protected else set()
         values: dict[str, Any] = {key: value for key, value in decoded.items() if key not in hidden}
         return {key: str(value) if hasattr(value, "name") else value for key, value in values.items()}
 

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from cantools.database.can import Message as DbcMessage
-
+from canopy.bus.decode import UndecodableError, physical, raw_values
+from canopy.compiler.bus_model import Message
 from canopy.live.codes import NO_CODE, code_name
 from canopy.live.frames import ChangeFrame, SnapshotFrame, ValueFrame
 from canopy.replay.log import Bus
@@ -42,16 +42,15 @@ def _explain_nodes(bus: Bus, was: dict[int, str], now: dict[int, str]) -> list[t
     return found or [("Sequence", "another one", "another one")]
 
 
-def _decode(message: DbcMessage, data: bytes) -> dict[str, str]:
+def _decode(message: Message, data: bytes) -> dict[str, str]:
     try:
-        raw = message.decode_simple(data, decode_choices=False, scaling=False)
-        values = message.decode_simple(data)
-    except Exception:
-        # cantools: too short, an unknown multiplexer
+        raw = raw_values(message, data)
+    except UndecodableError:
         return {"frame": data.hex(" ")}
+    signals = {signal.name: signal for signal in message.signals}
+    values = {name: physical(signals[name], value) for name, value in raw.items()}
     return {
-        name: f"{value} ({raw[name]})" if isinstance(value, str) or not isinstance(value, int | float) else f"{value:g}"
-        for name, value in values.items()
+        name: f"{value} ({raw[name]})" if isinstance(value, str) else f"{value:g}" for name, value in values.items()
     }
 
 

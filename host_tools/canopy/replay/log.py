@@ -15,17 +15,17 @@ from operator import xor
 from pathlib import Path
 
 import can
-from cantools.database import load_string
-from cantools.database.can import Database
-from cantools.database.can import Message as DbcMessage
 
+from canopy.bus.decode import IdTable
+from canopy.compiler.bus_model import Message
+from canopy.compiler.bus_reader import read_text
 from canopy.compiler.trace_layout import dbc as trace_dbc
 from canopy.files import FileError, check_file
 from canopy.live.frames import ArrivalsFrame, TickFrame
 from canopy.live.trace_model import VERSION
 from canopy.model import Model, ModelError
 from canopy.replay.ticks import Tick, find_times
-from canopy.signals import load_database, message_attribute
+from canopy.signals import load_bus
 from canopy.trace import mismatch
 from canopy.unixbus import encode
 
@@ -61,32 +61,47 @@ class Bus:
         Raises:
             ModelError: It cannot be used.
         """
-        database = load_database(model)
+        bus = load_bus(model)
         self.model = model
         self.ahead = model.trace.waits_periods + 1
         """A command may be so many ticks ahead of its CanopyTick."""
-        self.received: dict[int, DbcMessage] = {}
-        self.sent: dict[int, DbcMessage] = {}
+        self.received: dict[int, Message] = {}
+        """By the order of the controller's table."""
+        self.senders: dict[int, str] = {}
+        """Who sends a received message, by the DBC."""
+        self.sent: dict[int, Message] = {}
         """Commands and trace."""
         self.trace: dict[int, str] = {}
         """Which kind a trace message is."""
         self.protected: dict[int, int] = {}
         """The E2E data ids of protected commands."""
-        for message in database.messages:
-            number = key(message.frame_id, message.is_extended_frame)
-            if message.name in model.send:
-                self.sent[number] = message
-                data_id = message_attribute(message, "E2EDataId", -1)
-                if data_id >= 0:
-                    self.protected[number] = data_id
-            elif message.name in model.receive:
-                self.received[number] = message
-        trace = load_string(trace_dbc(model.trace.base, model.trace.extended, model.bus_node), "dbc")
-        assert isinstance(trace, Database)
-        for message in trace.messages:
-            number = key(message.frame_id, message.is_extended_frame)
+        messages = {message.name: message for message in bus.messages}
+        for name in model.send:
+            message = messages[name]
+            number = key(message.id, message.extended)
+            self.sent[number] = message
+            if message.data_id is not None:
+                self.protected[number] = message.data_id
+        for place, name in enumerate(model.receive):
+            if messages[name].is_transported:
+                raise ModelError(
+                    f"{model.path}: bus: {name} comes in several packets, which a replay cannot put together; leave it "
+                    "out of the bus with the overlay's `leave_out = true`, and record again"
+                )
+            self.received[place] = messages[name]
+            senders = bus.source.message(name).senders
+            self.senders[place] = senders[0] if senders else ""
+        self._places = {name: place for place, name in enumerate(model.receive)}
+        self._ids = IdTable(tuple(messages[name] for name in model.receive))
+        for message in read_text(trace_dbc(model.trace.base, model.trace.extended, model.bus_node)).messages:
+            number = key(message.id, message.extended)
             self.sent[number] = message
             self.trace[number] = message.name
+
+    def receives(self, identifier: int, extended: bool) -> int | None:
+        """The key in `received` of the message that a frame is; None: of none."""
+        found = self._ids.find(identifier, extended)
+        return None if found is None else self._places[found.name]
 
 
 @dataclass(frozen=True)
@@ -96,7 +111,7 @@ class Taken:
     place: int
     """Number of the frame in the log, from 1."""
     message: int
-    """Its key."""
+    """Its key in Bus.received."""
     sender: str
     """Who sends the message, by the DBC."""
     datagram: bytes
@@ -177,8 +192,9 @@ class _Reader:
         number = key(message.arbitration_id, message.is_extended_id)
         if message.is_error_frame:
             return
-        if number in self._bus.received:
-            self._take_received(message, place, self._bus.received[number])
+        received = self._bus.receives(message.arbitration_id, message.is_extended_id)
+        if received is not None:
+            self._take_received(message, place, received)
         elif number in self._bus.sent and not message.is_remote_frame:
             data = bytes(message.data)
             kind = self._bus.trace.get(number)
@@ -212,16 +228,16 @@ class _Reader:
                 del run.ticks[hole.tick :]
                 return
 
-    def _take_received(self, message: can.Message, place: int, known: DbcMessage) -> None:
+    def _take_received(self, message: can.Message, place: int, number: int) -> None:
+        known = self._bus.received[number]
         try:
             datagram = encode(message)
         except ValueError as error:
             raise LogError(f"{self.recording.path}: frame {place}: {error}") from error
-        fits = not message.is_remote_frame and message.is_fd == known.is_fd and message.dlc == known.length
+        long_enough = known.length <= message.dlc <= known.longest
+        fits = not message.is_remote_frame and message.is_fd == known.fd and long_enough
         fold = reduce(xor, message.data, message.arbitration_id & 0xFF) if fits else None
-        number = key(message.arbitration_id, message.is_extended_id)
-        sender = known.senders[0] if known.senders else ""
-        self.recording.received.append(Taken(place, number, sender, datagram, fold))
+        self.recording.received.append(Taken(place, number, self._bus.senders[number], datagram, fold))
 
     def _take_trace(self, kind: str, number: int, place: int, data: bytes) -> None:
         if kind == "CanopyTick":

@@ -83,11 +83,12 @@ def _datagram(bus: Bus, message: Message, values: dict[str, int], tick: int) -> 
     """A frame of a message."""
     import can
 
+    from canopy.bus.cantools_view import cantools_message
     from canopy.replay.e2e import COUNTERS, crc
     from canopy.unixbus import encode
 
     raw = {signal.name: values.get(f"{message.name}.{signal.name}", _accepted(signal, 0)) for signal in message.signals}
-    owner = bus.source.database.get_message_by_name(message.name)
+    owner = cantools_message(bus.source.message(message.name))
     every = {signal.name: raw.get(signal.name, 0) for signal in owner.signals}
     data = bytearray(owner.encode(every, scaling=False, strict=False).ljust(message.length, b"\0"))
     if message.data_id is not None:

@@ -20,16 +20,27 @@
 #define CANOPY_CAN_ACCEPT_MAX 512u
 
 /**
- * The acceptance filter: an exact list of ids. Data and remote frames with an id of the list are handed over (that a
+ * A set of ids: those with (id ^ `id`) & `mask` == 0. Bit 31 is 1 in an extended id (CANOPY_CAN_ACCEPT_EXTENDED). Standard
+ * ids are in bits 0..10, extended ones in bits 0..28. Bits 11..30 of a standard mask are 0.
+ */
+typedef struct {
+    uint32_t id;
+    uint32_t mask;
+} canopy_can_mask_t;
+
+/**
+ * The acceptance filter: an exact list of ids, and of sets of ids. Data and remote frames with an id of the list are handed over (that a
  * remote frame is not the message is the codec's business, which counts it), all others vanish uncounted, as in a CAN
  * controller's filter. An application has the list of what it receives in `canopy_app_t.acceptance`; to receive more, make
  * a list that continues with it.
  */
 typedef struct canopy_can_acceptance {
-    const uint32_t *ids; /**< Lives as long as the driver is open. NULL when count is 0. */
-    uint16_t count;      /**< 0..CANOPY_CAN_ACCEPT_MAX */
-    bool everything;     /**< Every data and remote frame, whatever the ids: for tools that watch. */
-    bool error_frames;   /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
+    const uint32_t *ids;            /**< Lives as long as the driver is open. NULL when count is 0. */
+    uint16_t count;                 /**< 0..CANOPY_CAN_ACCEPT_MAX */
+    uint16_t mask_count;            /**< 0..CANOPY_CAN_ACCEPT_MAX; both together at most that. */
+    bool everything;                /**< Every data and remote frame, whatever the ids: for tools that watch. */
+    bool error_frames;              /**< Error frames too (flag CANOPY_CAN_ERROR); they are counted in any case. */
+    const canopy_can_mask_t *masks; /**< With bit 31 in each mask. Lives as long. NULL when mask_count is 0. */
     const struct canopy_can_acceptance *next; /**< The list continues there; NULL: it ends. */
 } canopy_can_acceptance_t;
 
@@ -46,10 +57,10 @@ static inline bool canopy_can_acceptance_is_valid(const canopy_can_acceptance_t 
     uint32_t lists = 0;
 
     for (const canopy_can_acceptance_t *list = acceptance; list != NULL; list = list->next) {
-        count += list->count;
+        count += (uint32_t)list->count + list->mask_count;
         lists++;
         if (count > CANOPY_CAN_ACCEPT_MAX || lists > CANOPY_CAN_ACCEPT_MAX ||
-            (list->ids == NULL) != (list->count == 0u)) {
+            (list->ids == NULL) != (list->count == 0u) || (list->masks == NULL) != (list->mask_count == 0u)) {
             return false;
         }
     }
@@ -67,6 +78,33 @@ static inline bool canopy_can_accepts_everything(const canopy_can_acceptance_t *
     return false;
 }
 
+/** True when some of the sets has the id; `id` with CANOPY_CAN_ACCEPT_EXTENDED for a 29-bit one. O(count). */
+static inline bool canopy_can_masks_accept(const canopy_can_mask_t *masks, uint16_t count, uint32_t id)
+{
+    for (uint16_t index = 0; index < count; index++) {
+        if (((masks[index].id ^ id) & masks[index].mask) == 0u) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/** True when the list, or one that it continues with, has the id; as for canopy_can_masks_accept(). O(ids). */
+static inline bool canopy_can_is_listed(const canopy_can_acceptance_t *acceptance, uint32_t id)
+{
+    for (const canopy_can_acceptance_t *list = acceptance; list != NULL; list = list->next) {
+        for (uint16_t index = 0; index < list->count; index++) {
+            if (list->ids[index] == id) {
+                return true;
+            }
+        }
+        if (canopy_can_masks_accept(list->masks, list->mask_count, id)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /** True when the frame shall be handed to the loop. O(ids): the lists of a robot's node are short. */
 static inline bool canopy_can_accepts(const canopy_can_acceptance_t *acceptance, const canopy_can_frame_t *frame)
 {
@@ -77,13 +115,8 @@ static inline bool canopy_can_accepts(const canopy_can_acceptance_t *acceptance,
         if (error ? list->error_frames : list->everything) {
             return true;
         }
-        for (uint16_t index = 0; !error && index < list->count; index++) {
-            if (list->ids[index] == id) {
-                return true;
-            }
-        }
     }
-    return false;
+    return !error && canopy_can_is_listed(acceptance, id);
 }
 
 /**

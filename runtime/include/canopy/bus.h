@@ -19,6 +19,7 @@
 #include "canopy/clock.h"
 #include "canopy/count.h"
 #include "canopy/e2e.h"
+#include "canopy/transport.h"
 #include "canopy/tx.h"
 
 /** The age of a message that never came, and of one that is older than all others [ms]. */
@@ -26,10 +27,12 @@
 
 /** A message that the controller receives. Constant. */
 typedef struct {
-    uint32_t id;           /**< Arbitration id. */
-    uint8_t flags;         /**< CANOPY_CAN_EXTENDED, CANOPY_CAN_FD as the frame must have them. */
-    uint8_t length;        /**< Bytes; another length is refused. */
-    int32_t data_id;       /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
+    uint32_t id;     /**< Arbitration id. */
+    uint32_t mask;   /**< Of one of the canopy_bus_t.rx_masked: the bits of the id that count; `id` has no other. */
+    uint16_t length; /**< Bytes; fewer are refused. */
+    uint8_t more;    /**< Bytes beyond `length` that a frame may have, which nobody reads; more are refused. */
+    uint8_t flags;   /**< CANOPY_CAN_EXTENDED, CANOPY_CAN_FD as the frame must have them. */
+    int32_t data_id; /**< E2E data id 0..65535, or CANOPY_E2E_NONE. */
     canopy_time_t timeout; /**< [us] after which the message is stale; 0: never. */
     /**
      * Takes the values of `length` bytes into the input image.
@@ -53,10 +56,17 @@ typedef struct {
 
 /** The bus of one application. Constant. */
 typedef struct {
-    const canopy_rx_message_t *rx; /**< In ascending order of (extended, id). */
-    const canopy_tx_message_t *tx; /**< In the order of their urgency: the lowest arbitration id first. */
-    uint16_t rx_count;
+    /**
+     * In ascending order of (extended, id). Behind them the `rx_masked` ones, of whose id only a part counts (J1939's
+     * parameter groups); a frame that none before them is, is the first of these that it can be.
+     */
+    const canopy_rx_message_t *rx;
+    const canopy_tx_message_t *tx;        /**< In the order of their urgency: the lowest arbitration id first. */
+    const canopy_transport_t *transports; /**< Those of the masked ones that come in several packets. */
+    uint16_t rx_count;                    /**< All of rx. */
+    uint16_t rx_masked;
     uint16_t tx_count;
+    uint16_t transport_count;
     /** Gives every output its safe value: what is sent when no leaf writes it. */
     void (*reset_output)(void *output);
     /** Hands to the leaves, through the input image, what is true of the whole cycle. */
@@ -80,7 +90,7 @@ typedef struct {
     uint32_t unknown_id;     /**< Not a message of this controller. */
     uint32_t wrong_form;     /**< Wrong flags or length. */
     uint32_t wrong_crc;      /**< E2E: damaged. */
-    uint32_t wrong_sequence; /**< E2E: repeated, or out of order. */
+    uint32_t wrong_sequence; /**< E2E: repeated, or out of order. Several packets: not in order, late, or not all. */
     uint32_t out_of_range;   /**< A value outside the DBC's range. */
     uint32_t timeouts;       /**< A message became stale. */
 } canopy_bus_counters_t;
@@ -91,7 +101,9 @@ typedef struct {
     const canopy_bus_t *bus;
     void *input;
     void *output;
-    canopy_rx_state_t *rx; /**< bus->rx_count. */
+    canopy_rx_state_t *rx;                /**< bus->rx_count. */
+    canopy_transport_state_t *transports; /**< bus->transport_count. */
+    uint8_t *transport_data;              /**< Room for all messages of several packets. */
     canopy_bus_counters_t counters;
     /** What CanopyInputs tells of the frames taken since the start, so that a replay can take the same ones: */
     uint32_t taken;    /**< How many had the id of a message, refused ones too; modulo 2^32. */
@@ -104,10 +116,10 @@ typedef struct {
  * XOR every byte of data. It tells frames apart and notices their order; it protects nothing. O(length).
  * @param length bytes of data; not checked
  */
-uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_t length);
+uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint16_t length);
 
 /**
- * Takes one frame into the input image, or refuses and counts it. O(log messages + bytes).
+ * Takes one frame into the input image, or refuses and counts it. O(log messages + masked messages + bytes).
  * @param now the time of the cycle that takes it [us]; a frame that has arrived since has the age 0
  */
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now);

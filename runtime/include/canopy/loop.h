@@ -42,10 +42,12 @@ typedef struct {
     uint8_t *status; /**< tree->node_count; with a trace, of an array of uint32_t. */
     uint16_t *words; /**< tree->word_count. */
     canopy_bus_state_t *bus_state;
-    void *input;           /**< The input image. */
-    void *output;          /**< The output image. */
-    canopy_rx_state_t *rx; /**< bus->rx_count. */
-    canopy_tx_t *tx;       /**< The transmit side: for the driver's transmit interrupt. */
+    void *input;                          /**< The input image. */
+    void *output;                         /**< The output image. */
+    canopy_rx_state_t *rx;                /**< bus->rx_count. */
+    canopy_transport_state_t *transports; /**< bus->transport_count; NULL where there are none. */
+    uint8_t *transport_data;              /**< Room for all messages of several packets. */
+    canopy_tx_t *tx;                      /**< The transmit side: for the driver's transmit interrupt. */
     canopy_tx_memory_t tx_memory;
     canopy_trace_state_t *trace_state; /**< NULL without trace, as the next two. */
     uint8_t *sent;                     /**< nodes_max; of an array of uint32_t. */

@@ -18,6 +18,32 @@
     ((type)(((((physical) - (offset)) / (scale)) < 0.0) ? (((physical) - (offset)) / (scale)) - 0.5 \
                                                         : (((physical) - (offset)) / (scale)) + 0.5))
 
+/**
+ * Raw value that is nearest to a physical one in fixed point, (value - offset) / step, halves away from 0; limited to
+ * low..high. Exact for every value.
+ * @param step   not 0. low * step + offset and high * step + offset fit an int64_t, and so do their parts
+ */
+static inline int64_t canopy_raw_of_fixed(int64_t value, int64_t step, int64_t offset, int64_t low, int64_t high)
+{
+    const bool up = step > 0;
+    const int64_t smallest = (up ? low : high) * step + offset;
+    const int64_t largest = (up ? high : low) * step + offset;
+    int64_t raw, rest;
+
+    if (value <= smallest) {
+        return up ? low : high;
+    }
+    if (value >= largest) {
+        return up ? high : low;
+    }
+    raw = (value - offset) / step;
+    rest = (value - offset) % step;
+    if ((rest < 0 ? -rest : rest) >= (up ? step : -step) - (rest < 0 ? -rest : rest)) {
+        raw += (rest < 0) == up ? -1 : 1;
+    }
+    return raw;
+}
+
 /** Value of a two's complement number in the low `bits` (1..31) of raw; the bits above must be 0. */
 static inline int32_t canopy_sign_extend32(uint32_t raw, unsigned bits)
 {

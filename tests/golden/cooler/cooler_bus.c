@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xe8c17a7a25e8b1bbu
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x4782880113e71b53u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -107,8 +107,8 @@ static void set_cycle(void *input, const canopy_cycle_t *cycle)
 
 static const canopy_rx_message_t rx[] = {
     {.id = COOLER_CLIMATE_ID,
-     .flags = 0,
      .length = COOLER_CLIMATE_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_climate,
@@ -132,7 +132,7 @@ static const uint32_t accepted_ids[] = {
 
 const canopy_can_acceptance_t cooler_acceptance = {
     .ids = accepted_ids,
-    .count = COOLER_RX_MESSAGES,
+    .count = 1u,
 };
 
 const canopy_bus_t cooler_bus = {

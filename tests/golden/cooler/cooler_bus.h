@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COOLER_BUS_H
-#define CANOPY_GENERATED_COOLER_BUS_H 0xe8c17a7a25e8b1bbu /* of this run */
+#define CANOPY_GENERATED_COOLER_BUS_H 0x4782880113e71b53u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -24,6 +24,21 @@
 #define COOLER_CLIMATE_LENGTH 4u
 /** Climate.Temperature [degC]: raw value of a physical constant; 1 bit is 0.1 degC. */
 #define COOLER_CLIMATE_TEMPERATURE(physical) CANOPY_RAW(int32_t, physical, 0.1, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COOLER_CLIMATE_TEMPERATURE_PHYSICAL(raw) (((double)(raw) * 1.0 + (0.0)) / 10.0)
+/** Physical values in fixed point, exactly: whole numbers of 1/10 degC. */
+#define COOLER_CLIMATE_TEMPERATURE_PER_UNIT INT32_C(10)
+
+static inline int32_t cooler_climate_temperature_fixed(int32_t raw)
+{
+    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+}
+
+/** The raw value nearest to that of _fixed(), limited to the signal's range. */
+static inline int32_t cooler_climate_temperature_from_fixed(int32_t value)
+{
+    return (int32_t)canopy_raw_of_fixed(value, INT64_C(1), INT64_C(0), INT64_C(-400), INT64_C(1200));
+}
 
 /** Values of Climate.Door. */
 typedef enum {
@@ -33,12 +48,29 @@ typedef enum {
 } cooler_climate_door_t;
 /** Climate.Supply [V]: raw value of a physical constant; 1 bit is 0.1 V. */
 #define COOLER_CLIMATE_SUPPLY(physical) CANOPY_RAW(int32_t, physical, 0.1, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COOLER_CLIMATE_SUPPLY_PHYSICAL(raw) (((double)(raw) * 1.0 + (0.0)) / 10.0)
+/** Physical values in fixed point, exactly: whole numbers of 1/10 V. */
+#define COOLER_CLIMATE_SUPPLY_PER_UNIT INT32_C(10)
+
+static inline int32_t cooler_climate_supply_fixed(int32_t raw)
+{
+    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+}
+
+/** The raw value nearest to that of _fixed(), limited to the signal's range. */
+static inline int32_t cooler_climate_supply_from_fixed(int32_t value)
+{
+    return (int32_t)canopy_raw_of_fixed(value, INT64_C(1), INT64_C(0), INT64_C(0), INT64_C(250));
+}
 
 /* Compressor */
 #define COOLER_COMPRESSOR_ID 0x200u
 #define COOLER_COMPRESSOR_LENGTH 2u
 /** Compressor.Power [%]: raw value of a physical constant; 1 bit is 1 %. */
 #define COOLER_COMPRESSOR_POWER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COOLER_COMPRESSOR_POWER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /** Values of Compressor.Mode. */
 typedef enum {

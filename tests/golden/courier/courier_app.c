@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xe5c033b0d0183f47u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xf1665b7e7eceba64u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0xe5c033b0d0183f47u
+#if CANOPY_GENERATED_COURIER_APP_H != 0xf1665b7e7eceba64u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xe5c033b0d0183f47u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
 #error "files of two runs of canopy: generate them again"
 #endif
 

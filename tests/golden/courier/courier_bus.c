@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xe5c033b0d0183f47u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -294,29 +294,29 @@ static void set_cycle(void *input, const canopy_cycle_t *cycle)
 
 static const canopy_rx_message_t rx[] = {
     {.id = COURIER_POSE_ID,
-     .flags = 0,
      .length = COURIER_POSE_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_pose,
      .set_age = set_pose_age},
     {.id = COURIER_ORDER_ID,
-     .flags = 0,
      .length = COURIER_ORDER_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_order,
      .set_age = set_order_age},
     {.id = COURIER_PLAN_REPLY_ID,
-     .flags = 0,
      .length = COURIER_PLAN_REPLY_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_plan_reply,
      .set_age = set_plan_reply_age},
     {.id = COURIER_MAP_STATUS_ID,
-     .flags = 0,
      .length = COURIER_MAP_STATUS_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_map_status,
@@ -359,7 +359,7 @@ static const uint32_t accepted_ids[] = {
 
 const canopy_can_acceptance_t courier_acceptance = {
     .ids = accepted_ids,
-    .count = COURIER_RX_MESSAGES,
+    .count = 4u,
 };
 
 const canopy_bus_t courier_bus = {

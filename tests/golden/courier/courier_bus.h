@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0xe5c033b0d0183f47u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0xf1665b7e7eceba64u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -24,24 +24,36 @@
 #define COURIER_POSE_LENGTH 4u
 /** Pose.X [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_POSE_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_POSE_X_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Pose.Y [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_POSE_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_POSE_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /* Order: Where the operator wants the robot. A new order has a new number; 0 is no order. */
 #define COURIER_ORDER_ID 0x110u
 #define COURIER_ORDER_LENGTH 5u
 /** Order.Number: raw value of a physical constant; 1 bit is 1. */
 #define COURIER_ORDER_NUMBER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_ORDER_NUMBER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Order.X [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_ORDER_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_ORDER_X_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Order.Y [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_ORDER_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_ORDER_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /* PlanReply: The planner's answer to the request of the same number: one point on the way, then the goal. */
 #define COURIER_PLAN_REPLY_ID 0x120u
 #define COURIER_PLAN_REPLY_LENGTH 6u
 /** PlanReply.Number: raw value of a physical constant; 1 bit is 1. */
 #define COURIER_PLAN_REPLY_NUMBER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REPLY_NUMBER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /** Values of PlanReply.Result. */
 typedef enum {
@@ -51,30 +63,44 @@ typedef enum {
 } courier_plan_reply_result_t;
 /** PlanReply.ViaX [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_PLAN_REPLY_VIA_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REPLY_VIA_X_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** PlanReply.ViaY [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_PLAN_REPLY_VIA_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REPLY_VIA_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /* MapStatus: The last request to clear the map that has been obeyed. */
 #define COURIER_MAP_STATUS_ID 0x130u
 #define COURIER_MAP_STATUS_LENGTH 1u
 /** MapStatus.ClearNumber: raw value of a physical constant; 1 bit is 1. */
 #define COURIER_MAP_STATUS_CLEAR_NUMBER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_MAP_STATUS_CLEAR_NUMBER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /* PlanRequest: 0: nothing is asked for. */
 #define COURIER_PLAN_REQUEST_ID 0x200u
 #define COURIER_PLAN_REQUEST_LENGTH 5u
 /** PlanRequest.Number: raw value of a physical constant; 1 bit is 1. */
 #define COURIER_PLAN_REQUEST_NUMBER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REQUEST_NUMBER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** PlanRequest.X [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_PLAN_REQUEST_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REQUEST_X_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** PlanRequest.Y [mm]: raw value of a physical constant; 1 bit is 1 mm. */
 #define COURIER_PLAN_REQUEST_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_PLAN_REQUEST_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /* MapCommand: 0: nothing is to be cleared. */
 #define COURIER_MAP_COMMAND_ID 0x210u
 #define COURIER_MAP_COMMAND_LENGTH 2u
 /** MapCommand.ClearNumber: raw value of a physical constant; 1 bit is 1. */
 #define COURIER_MAP_COMMAND_CLEAR_NUMBER(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_MAP_COMMAND_CLEAR_NUMBER_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /** Values of MapCommand.Layer. */
 typedef enum {
@@ -87,8 +113,12 @@ typedef enum {
 #define COURIER_DRIVE_LENGTH 4u
 /** Drive.SpeedX [mm/s]: raw value of a physical constant; 1 bit is 1 mm/s. */
 #define COURIER_DRIVE_SPEED_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_DRIVE_SPEED_X_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Drive.SpeedY [mm/s]: raw value of a physical constant; 1 bit is 1 mm/s. */
 #define COURIER_DRIVE_SPEED_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define COURIER_DRIVE_SPEED_Y_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /**
  * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they

@@ -12,7 +12,7 @@
  * what it was before. encode goes by the multiplexer's value and does not look at `has_x`.
  */
 #ifndef CANOPY_GENERATED_GRIPPER_CODEC_H
-#define CANOPY_GENERATED_GRIPPER_CODEC_H 0xeb01bc7adf1ab96au /* of this run */
+#define CANOPY_GENERATED_GRIPPER_CODEC_H 0x38a4a75ddd110d04u /* of this run */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -27,16 +27,41 @@
 #define GRIPPER_PARAMETER_LENGTH 8u
 /** Parameter.Selector: raw value of a physical constant; 1 bit is 1. */
 #define GRIPPER_PARAMETER_SELECTOR(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_SELECTOR_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Parameter.Temperature [degC]: raw value of a physical constant; 1 bit is 1 degC. */
 #define GRIPPER_PARAMETER_TEMPERATURE(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_TEMPERATURE_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Parameter.Page: raw value of a physical constant; 1 bit is 1. */
 #define GRIPPER_PARAMETER_PAGE(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_PAGE_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Parameter.Force [N]: raw value of a physical constant; 1 of the raw value is 1 N. */
 #define GRIPPER_PARAMETER_FORCE(physical) ((float)(((physical) - (0.0)) / (1.0)))
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_FORCE_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Parameter.Serial: raw value of a physical constant; 1 bit is 1. */
 #define GRIPPER_PARAMETER_SERIAL(physical) CANOPY_RAW(int64_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_SERIAL_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 /** Parameter.Hours [h]: raw value of a physical constant; 1 bit is 0.1 h. */
 #define GRIPPER_PARAMETER_HOURS(physical) CANOPY_RAW(int32_t, physical, 0.1, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_PARAMETER_HOURS_PHYSICAL(raw) (((double)(raw) * 1.0 + (0.0)) / 10.0)
+/** Physical values in fixed point, exactly: whole numbers of 1/10 h. */
+#define GRIPPER_PARAMETER_HOURS_PER_UNIT INT32_C(10)
+
+static inline int32_t gripper_parameter_hours_fixed(int32_t raw)
+{
+    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+}
+
+/** The raw value nearest to that of _fixed(), limited to the signal's range. */
+static inline int32_t gripper_parameter_hours_from_fixed(int32_t value)
+{
+    return (int32_t)canopy_raw_of_fixed(value, INT64_C(1), INT64_C(0), INT64_C(0), INT64_C(60000));
+}
 #define GRIPPER_PARAMETER_EXTENDED 0
 #define GRIPPER_PARAMETER_FD 0
 
@@ -62,6 +87,8 @@ int gripper_parameter_encode(const gripper_parameter_t *self, uint8_t *data, siz
 #define GRIPPER_POSE_LENGTH 8u
 /** Pose.Width [mm]: raw value of a physical constant; 1 of the raw value is 1 mm. */
 #define GRIPPER_POSE_WIDTH(physical) ((double)(((physical) - (0.0)) / (1.0)))
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define GRIPPER_POSE_WIDTH_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 #define GRIPPER_POSE_EXTENDED 0
 #define GRIPPER_POSE_FD 0
 

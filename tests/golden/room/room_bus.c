@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xe0a77569b3e82854u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe09dd04358732ff8u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -79,8 +79,8 @@ static void set_cycle(void *input, const canopy_cycle_t *cycle)
 
 static const canopy_rx_message_t rx[] = {
     {.id = ROOM_CLIMATE_ID,
-     .flags = 0,
      .length = ROOM_CLIMATE_LENGTH,
+     .flags = 0,
      .data_id = CANOPY_E2E_NONE,
      .timeout = 500000u, /* 500 ms */
      .decode = decode_climate,
@@ -104,7 +104,7 @@ static const uint32_t accepted_ids[] = {
 
 const canopy_can_acceptance_t room_acceptance = {
     .ids = accepted_ids,
-    .count = ROOM_RX_MESSAGES,
+    .count = 1u,
 };
 
 const canopy_bus_t room_bus = {

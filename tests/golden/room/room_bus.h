@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H 0xe0a77569b3e82854u /* of this run */
+#define CANOPY_GENERATED_ROOM_BUS_H 0xe09dd04358732ff8u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -24,12 +24,29 @@
 #define ROOM_CLIMATE_LENGTH 2u
 /** Climate.Temperature [degC]: raw value of a physical constant; 1 bit is 0.1 degC. */
 #define ROOM_CLIMATE_TEMPERATURE(physical) CANOPY_RAW(int32_t, physical, 0.1, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define ROOM_CLIMATE_TEMPERATURE_PHYSICAL(raw) (((double)(raw) * 1.0 + (0.0)) / 10.0)
+/** Physical values in fixed point, exactly: whole numbers of 1/10 degC. */
+#define ROOM_CLIMATE_TEMPERATURE_PER_UNIT INT32_C(10)
+
+static inline int32_t room_climate_temperature_fixed(int32_t raw)
+{
+    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+}
+
+/** The raw value nearest to that of _fixed(), limited to the signal's range. */
+static inline int32_t room_climate_temperature_from_fixed(int32_t value)
+{
+    return (int32_t)canopy_raw_of_fixed(value, INT64_C(1), INT64_C(0), INT64_C(-400), INT64_C(1200));
+}
 
 /* FanCommand */
 #define ROOM_FAN_COMMAND_ID 0x200u
 #define ROOM_FAN_COMMAND_LENGTH 1u
 /** FanCommand.Speed [%]: raw value of a physical constant; 1 bit is 1 %. */
 #define ROOM_FAN_COMMAND_SPEED(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
+/** The physical value of a raw one, as a double: only where your program may use floating point. */
+#define ROOM_FAN_COMMAND_SPEED_PHYSICAL(raw) ((double)(raw) * 1.0 + (0.0))
 
 /**
  * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they

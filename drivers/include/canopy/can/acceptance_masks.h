@@ -19,17 +19,8 @@
 #include "canopy/acceptance.h"
 
 /**
- * A frame passes when (its id ^ `id`) & `mask` is 0. Bit 31 is 1 in an extended id (CANOPY_CAN_ACCEPT_EXTENDED), and in each
- * mask unless `most` was 1 and both formats are listed: then the mask cannot tell them apart. Standard ids are in bits
- * 0..10, extended ones in bits 0..28. Bits 11..30 of a standard mask are 0.
- */
-typedef struct {
-    uint32_t id;
-    uint32_t mask;
-} canopy_can_mask_t;
-
-/**
- * Finds masks that let every id of the list through, and as few others as it can.
+ * Finds masks that let every id of the list through, and as few others as it can. Each has bit 31 (the format) unless
+ * `most` was 1 and both formats are listed: then the mask cannot tell them apart.
  *
  * @param acceptance the list, and those that it continues with
  * @param masks      room for `most` pairs
@@ -41,8 +32,5 @@ typedef struct {
  */
 int canopy_can_acceptance_masks(const canopy_can_acceptance_t *acceptance, canopy_can_mask_t *masks, uint16_t most,
                                 bool *exact);
-
-/** True when some of the masks lets the id through; `id` with CANOPY_CAN_ACCEPT_EXTENDED for a 29-bit one. O(count). */
-bool canopy_can_masks_accept(const canopy_can_mask_t *masks, uint16_t count, uint32_t id);
 
 #endif

@@ -4,15 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from decimal import Decimal
 
+from canopy.bus import doubts
 from canopy.check.facts import Facts
 from canopy.check.registry import Hit, Severity, rule
-
-FEW = 256
-"""A range that a byte could hold, where the bits hold 256 times as many values, is narrow."""
-PLAIN_BITS = 16
-"""Unscaled numbers of so many bits often count little: modes, errors."""
 
 
 @rule(
@@ -29,7 +24,7 @@ def swapped_range(facts: Facts) -> Iterator[Hit]:
         return
     for message, signal, written in facts.bus.signals():
         low, high = written.minimum, written.maximum
-        if low is not None and high is not None and low >= high and (low, high) != (0, 0):
+        if low is not None and high is not None and low >= high and (low or high):
             where = facts.bus.place(message, signal)
             yield Hit(where, f"signal '{message.name}.{signal.name}' has the range [{low}|{high}]")
     for name, found in facts.bus.reversed_ranges():
@@ -49,7 +44,7 @@ def never_stale(facts: Facts) -> Iterator[Hit]:
     if facts.bus is None:
         return
     for message in facts.bus.bus.receive:
-        if message.timeout_ms == 0:
+        if message.timeout_us == 0:
             yield Hit(facts.bus.place(message), f"input '{message.name}' never gets stale")
 
 
@@ -99,24 +94,13 @@ def shared_data_id(facts: Facts) -> Iterator[Hit]:
     "A range that refuses almost all values of its bits",
     why="A frame with a value out of range is refused as a whole. A range that was meant for raw values, for another "
     "scale, or for an unsigned signal refuses most frames.",
-    way_out="Correct the range, the scale or the sign (@1+); 0 for both ends is no range.",
+    way_out="Correct the range, the scale or the sign (@1+), or the overlay's `range`; 0 for both ends is no range.",
 )
 def narrow_range(facts: Facts) -> Iterator[Hit]:
     """Signals with a table of values have their ranges for it."""
     if facts.bus is None:
         return
     for message, signal, written in facts.bus.signals():
-        if signal.is_float or signal.is_bool or signal.selects or signal.choices:
-            continue
-        if written.minimum is None or written.maximum is None or not written.minimum < written.maximum:
-            continue
-        accepted = sum(high - low + 1 for low, high in signal.accepted)
-        is_narrow = accepted <= FEW and accepted * FEW < 2**signal.length
-        raw_end = (Decimal(str(written.maximum)) - signal.offset) / signal.scale
-        is_plain = signal.scale == 1 and signal.length <= PLAIN_BITS
-        text = f"signal '{message.name}.{signal.name}' takes {accepted} of the {2**signal.length} values of its bits"
-        if signal.signed and signal.low >= 0 and raw_end > signal.limits[1]:
-            yield Hit(facts.bus.place(message, signal), f"{text}, none below 0: its range is one of an unsigned signal")
-        elif accepted == 1 or (is_narrow and not is_plain):
-            range_text = f"[{written.minimum}|{written.maximum}]"
-            yield Hit(facts.bus.place(message, signal), f"{text}: its range is {range_text}")
+        why = doubts.narrow_range(signal, written)
+        if why:
+            yield Hit(facts.bus.place(message, signal), f"{doubts.accepted_text(message.name, signal)}, {why}")
