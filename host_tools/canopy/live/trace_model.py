@@ -94,7 +94,7 @@ class Trace:
 
     @property
     def waits_periods(self) -> int:
-        """So long after its tick a frame can leave: CANOPY_TRACE_PERIODS, and those that there is room for."""
+        """Periods after its tick in which a frame can still leave: CANOPY_TRACE_PERIODS, and as many as `ticks`."""
         return 4 + self.ticks
 
     @cached_property
