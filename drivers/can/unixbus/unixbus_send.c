@@ -1,0 +1,290 @@
+/* SPDX-License-Identifier: MIT */
+/**
+ * @file
+ * The unixbus's way out: one socket for each other participant, and the newest frames for those that are full just now.
+ *
+ * The loop's thread sends a frame to everybody who has got all before it. Who is behind is the other thread's to serve: so
+ * a send costs the loop one call for each participant that keeps up, and nothing for one that does not.
+ */
+#include <errno.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "unixbus_internal.h"
+
+enum { FIRST_PAUSE_US = 1000, LONGEST_PAUSE_US = 16000, AT_ONCE = 32, FINISH_STEP_NS = 1000000 };
+
+typedef enum { TAKEN, FULL, GONE } delivery_t;
+
+int64_t canopy_unixbus_now(void)
+{
+    return canopy_arrival_monotonic() / 1000;
+}
+
+/* With the loop's priority while the loop waits for it: the thread holds it for a few calls of the kernel at most. */
+static int make_lock(pthread_mutex_t *lock)
+{
+    pthread_mutexattr_t attributes;
+    int number = pthread_mutexattr_init(&attributes);
+
+    if (number == 0) {
+        (void)pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT); /* where the kernel has it */
+        number = pthread_mutex_init(lock, &attributes);
+        (void)pthread_mutexattr_destroy(&attributes);
+    }
+    return number;
+}
+
+canopy_error_t canopy_unixbus_tx_open(canopy_unixbus_tx_t *self, const char *bus)
+{
+    const canopy_error_t error = canopy_unixbus_folder_init(&self->folder, bus);
+    if (error != CANOPY_OK) {
+        return error;
+    }
+    self->head = 0u;
+    self->sent = 0u;
+    self->dropped = 0u;
+    atomic_init(&self->is_behind, false);
+    errno = make_lock(&self->lock);
+    return errno == 0 ? CANOPY_OK : CANOPY_ERROR_IO;
+}
+
+void canopy_unixbus_tx_close(canopy_unixbus_tx_t *self)
+{
+    canopy_unixbus_folder_clear(&self->folder);
+    (void)pthread_mutex_destroy(&self->lock);
+}
+
+/** Everything that is neither the participant's end nor its absence passes: it is tried again. */
+static delivery_t failed(int number)
+{
+    switch (number) {
+    case ECONNREFUSED: /* nobody holds the socket any more */
+    case ENOENT:       /* it is leaving the bus in good order */
+    case EPIPE:
+    case ECONNRESET:
+    case ENOTCONN:
+    case EPROTOTYPE: /* a socket of another kind: no participant */
+    case ENOTSOCK:
+        return GONE;
+    default:
+        return FULL;
+    }
+}
+
+/* A link could lead out of the bus, to whoever reads a socket elsewhere. */
+static delivery_t connect_to(canopy_unixbus_peer_t *peer, const struct sockaddr_un *address)
+{
+    struct stat status;
+    if (lstat(address->sun_path, &status) == 0 && !S_ISSOCK(status.st_mode)) {
+        return GONE;
+    }
+    const int made = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (made < 0) {
+        return FULL;
+    }
+    if (connect(made, (const struct sockaddr *)address, sizeof *address) != 0) {
+        const int number = errno;
+        (void)close(made);
+        errno = number;
+        return failed(number);
+    }
+    peer->socket = made;
+    return TAKEN;
+}
+
+static delivery_t deliver(canopy_unixbus_tx_t *self, canopy_unixbus_peer_t *peer, const canopy_unixbus_sent_t *frame)
+{
+    uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX];
+    struct sockaddr_un address;
+    const uint8_t told = peer->untold > UINT8_MAX ? UINT8_MAX : (uint8_t)peer->untold;
+    delivery_t delivery = TAKEN;
+
+    if (!canopy_unixbus_folder_address(&self->folder, peer->name, &address)) {
+        return GONE; /* nobody can have bound a name that does not fit */
+    }
+    if (peer->socket < 0) {
+        delivery = connect_to(peer, &address);
+    }
+    if (delivery == TAKEN) {
+        memcpy(datagram, frame->datagram, frame->size);
+        datagram[CANOPY_UNIXBUS_LOST] = told;
+        if (send(peer->socket, datagram, frame->size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) {
+            peer->untold -= told;
+            return TAKEN;
+        }
+        delivery = failed(errno);
+    }
+    if (delivery == GONE && errno == ECONNREFUSED) {
+        (void)unlink(address.sun_path); /* its owner died without closing */
+    }
+    return delivery;
+}
+
+static void lose(canopy_unixbus_tx_t *self, canopy_unixbus_peer_t *peer, uint32_t frames)
+{
+    peer->next += frames;
+    peer->untold = peer->untold > UINT32_MAX - frames ? UINT32_MAX : peer->untold + frames;
+    peer->is_deaf = true;
+    self->dropped += frames;
+}
+
+/** Gives a participant what it has not got. @return false: it is gone */
+static bool serve(canopy_unixbus_tx_t *self, canopy_unixbus_peer_t *peer, int64_t now)
+{
+    for (unsigned given = 0; given < AT_ONCE && peer->next != self->head;) {
+        const uint32_t behind = self->head - peer->next;
+        const canopy_unixbus_sent_t *frame = &self->frames[peer->next % CANOPY_UNIXBUS_BACKLOG];
+        if (behind > CANOPY_UNIXBUS_BACKLOG) {
+            lose(self, peer, behind - CANOPY_UNIXBUS_BACKLOG);
+            continue;
+        }
+        if (now - frame->sent_at > CANOPY_UNIXBUS_LATE_US) {
+            lose(self, peer, 1u);
+            continue;
+        }
+        switch (deliver(self, peer, frame)) {
+        case TAKEN:
+            peer->next++;
+            peer->pause_us = 0u;
+            peer->is_deaf = false;
+            given++;
+            break;
+        case FULL:
+            peer->pause_us = peer->pause_us == 0u ? FIRST_PAUSE_US : 2u * peer->pause_us;
+            peer->pause_us = peer->pause_us > LONGEST_PAUSE_US ? LONGEST_PAUSE_US : peer->pause_us;
+            peer->retry_at = now + peer->pause_us;
+            return true;
+        case GONE:
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool is_due(const canopy_unixbus_peer_t *peer, int64_t now)
+{
+    return peer->pause_us == 0u || now >= peer->retry_at;
+}
+
+/** What became of a frame. */
+typedef struct {
+    bool taken;  /* somebody has it */
+    bool coming; /* somebody who takes frames will get it soon */
+    bool behind; /* somebody has not got it */
+} spread_t;
+
+/** Gives everybody the newest frame who has got all others. */
+static spread_t spread(canopy_unixbus_tx_t *self, int64_t now)
+{
+    spread_t result = {0};
+    for (size_t i = 0; i < self->folder.count;) {
+        canopy_unixbus_peer_t *peer = &self->folder.peers[i];
+        const bool keeps_up = peer->next + 1u == self->head;
+        if (keeps_up && is_due(peer, now) && !serve(self, peer, now)) {
+            canopy_unixbus_folder_forget(&self->folder, i);
+            continue;
+        }
+        result.taken |= peer->next == self->head;
+        result.coming |= !peer->is_deaf;
+        result.behind |= peer->next != self->head;
+        i++;
+    }
+    return result;
+}
+
+static int send_locked(canopy_unixbus_tx_t *self, const canopy_can_frame_t *frame)
+{
+    canopy_unixbus_sent_t *place = &self->frames[self->head % CANOPY_UNIXBUS_BACKLOG];
+    const int64_t now = canopy_unixbus_now();
+    const canopy_error_t error = canopy_unixbus_folder_refresh(&self->folder, self->head);
+    if (error != CANOPY_OK) {
+        self->dropped++;
+        return error;
+    }
+    place->sent_at = now;
+    place->size = (uint8_t)canopy_unixbus_encode(place->datagram, frame);
+    self->head++;
+    const spread_t result = spread(self, now);
+    if (self->folder.count > 0u && !result.taken && !result.coming) {
+        self->head--; /* nobody has it, so it is not out */
+        return 0;
+    }
+    self->dropped += self->folder.too_many;
+    self->sent++;
+    if (result.behind) {
+        atomic_store(&self->is_behind, true);
+    }
+    return 1;
+}
+
+int canopy_unixbus_tx_send(canopy_unixbus_tx_t *self, const canopy_can_frame_t *frame)
+{
+    (void)pthread_mutex_lock(&self->lock);
+    const bool is_frame = canopy_can_frame_can_be_sent(frame);
+    self->dropped += !is_frame;
+    const int result = is_frame ? send_locked(self, frame) : CANOPY_ERROR_ARGUMENT;
+    (void)pthread_mutex_unlock(&self->lock);
+    return result;
+}
+
+/* The lock is given back after each participant: the loop waits for one of them at most. */
+int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self)
+{
+    int64_t soonest = -1;
+    const int64_t now = canopy_unixbus_now();
+
+    atomic_store(&self->is_behind, false); /* set again by whoever is found behind, here or by the loop meanwhile */
+    for (size_t i = 0;;) {
+        (void)pthread_mutex_lock(&self->lock);
+        const bool is_there = i < self->folder.count;
+        canopy_unixbus_peer_t *peer = &self->folder.peers[i];
+        if (is_there && peer->next != self->head && is_due(peer, now) && !serve(self, peer, now)) {
+            canopy_unixbus_folder_forget(&self->folder, i); /* the last one has its place now */
+        } else if (is_there) {
+            if (peer->next != self->head) {
+                const int64_t left = peer->pause_us == 0u ? 0 : peer->retry_at - now;
+                soonest = soonest < 0 || left < soonest ? left : soonest;
+            }
+            i++;
+        }
+        (void)pthread_mutex_unlock(&self->lock);
+        if (!is_there) {
+            break;
+        }
+    }
+    if (soonest >= 0) {
+        atomic_store(&self->is_behind, true);
+    }
+    return soonest;
+}
+
+void canopy_unixbus_tx_finish(canopy_unixbus_tx_t *self)
+{
+    const int64_t end = canopy_unixbus_now() + CANOPY_UNIXBUS_LATE_US;
+    bool coming = true;
+
+    while (coming && canopy_unixbus_now() < end) {
+        coming = false;
+        (void)pthread_mutex_lock(&self->lock);
+        for (size_t i = 0; i < self->folder.count; i++) {
+            const canopy_unixbus_peer_t *peer = &self->folder.peers[i];
+            coming |= peer->next != self->head && !peer->is_deaf;
+        }
+        (void)pthread_mutex_unlock(&self->lock);
+        if (coming) {
+            (void)nanosleep(&(struct timespec){.tv_nsec = FINISH_STEP_NS}, NULL);
+        }
+    }
+}
+
+bool canopy_unixbus_tx_is_joined(canopy_unixbus_tx_t *self)
+{
+    (void)pthread_mutex_lock(&self->lock);
+    const bool result = canopy_unixbus_folder_refresh(&self->folder, self->head) == CANOPY_OK;
+    (void)pthread_mutex_unlock(&self->lock);
+    return result;
+}
