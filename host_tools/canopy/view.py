@@ -63,7 +63,7 @@ def line(watch: Watch, now: float) -> str:
     leaves = ", ".join(active[:_LEAF_NAMES_IN_A_LINE]) + more
     return (
         f"tick {view.tick} {status_name(view.root_status)} [{leaves}] {signals}; {_pace(watch, now)}{_bus(view)}; "
-        f"{_losses(view)}"
+        f"{_losses(view)}{'; THE CONTROLLER CLAIMS ANOTHER TREE' if watch.disagreement else ''}"
     )
 
 
@@ -77,7 +77,8 @@ def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> R
         Panel(_tree(watch, silent, ascii_only), title=styled(watch.model.tree_id), title_align="left"),
         Panel(_signals(watch, now), title="signals", title_align="left"),
     )
-    return Group(styled(title, style="bold"), table, _footer(watch, now))
+    claim = [styled(watch.disagreement, style="bold red")] if watch.disagreement else []
+    return Group(styled(title, style="bold"), table, *claim, _footer(watch, now))
 
 
 def _tree(watch: Watch, silent: bool, ascii_only: bool) -> Tree:

@@ -43,7 +43,8 @@ A controller answers a number once. When that answer was lost, or the simulator 
 had left off at, no repeat would ever be answered.
 """
 
-SEND_BUFFER_FULL = {errno.ENOBUFS, errno.EAGAIN}
+NOT_OUT = {errno.ENOBUFS, errno.EAGAIN, errno.ENETDOWN}
+"""A frame that found the transmit buffer full, or the bus away: it is dropped, and the next one may do better."""
 
 
 class BusGoneError(Exception):
@@ -87,7 +88,7 @@ class Simulation:
     steps: int | None = None
     sent: int = 0
     dropped: int = 0
-    """Frames that found the bus's transmit buffer full."""
+    """Frames that found the bus's transmit buffer full, or the bus away."""
     received: int = 0
     slips: int = 0
     """Real time: cycles skipped because the process came more than a period late."""
@@ -185,7 +186,7 @@ class Simulation:
         try:
             self.bus.send(frame)
         except can.CanError as error:
-            if error.error_code not in SEND_BUFFER_FULL and "buffer full" not in str(error):
+            if error.error_code not in NOT_OUT and "buffer full" not in str(error):
                 raise BusGoneError(f"cannot send on {self.bus.channel_info}: {error}") from error
             self.dropped += 1
         except OSError as error:

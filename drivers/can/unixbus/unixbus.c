@@ -98,21 +98,38 @@ static ssize_t take_next(canopy_unixbus_t *self)
  * Never for ever: a poll() that is woken while unixbus_restart() puts another socket under the number looks at the new one,
  * and goes on waiting for the old one.
  */
-static void wait_for_work(const canopy_unixbus_t *self, int64_t timeout_us, bool can_receive)
+static void wait_for_work(const canopy_unixbus_t *self, canopy_unixbus_waiting_t *behind, int64_t timeout_us,
+                          bool can_receive)
 {
+    enum { OWN = 2 };
+    struct pollfd descriptors[OWN + CANOPY_UNIXBUS_PEERS_MAX];
     const int64_t us = timeout_us < 0 || timeout_us > LOOK_US ? LOOK_US : timeout_us;
     const struct timespec timeout = {.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000L};
-    struct pollfd descriptors[] = {{.fd = self->work, .events = POLLIN}, {.fd = self->socket, .events = POLLIN}};
 
-    if (ppoll(descriptors, can_receive ? 2u : 1u, &timeout, NULL) < 0 && errno != EINTR) {
+    descriptors[0] = (struct pollfd){.fd = self->work, .events = POLLIN};
+    descriptors[1] = (struct pollfd){.fd = can_receive ? self->socket : -1, .events = POLLIN};
+    memcpy(&descriptors[OWN], behind->sockets, behind->count * sizeof descriptors[0]);
+    if (ppoll(descriptors, OWN + behind->count, &timeout, NULL) < 0 && errno != EINTR) {
         (void)nanosleep(&(struct timespec){.tv_nsec = RETRY_US * 1000L}, NULL);
     }
+    memcpy(behind->sockets, &descriptors[OWN], behind->count * sizeof descriptors[0]);
+}
+
+static bool somebody_has_room(const canopy_unixbus_waiting_t *behind)
+{
+    for (size_t i = 0; i < behind->count; i++) {
+        if (behind->sockets[i].revents != 0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /** The receive "interrupt", and the way out for what could not be sent at once. */
 static void *receive_thread(void *context)
 {
     canopy_unixbus_t *self = context;
+    canopy_unixbus_waiting_t behind = {.count = 0};
     int64_t catch_up_at = 0;
 
     while (!atomic_load(&self->stopping)) {
@@ -123,19 +140,19 @@ static void *receive_thread(void *context)
             atomic_store(&self->failure, errno);
             count_up(self->event);
         }
+        clear(self->work);
         if (atomic_load(&self->tx.is_behind)) { /* also while frames come without end */
             left = catch_up_at - canopy_unixbus_now();
-            if (left <= 0) {
-                clear(self->work);
-                left = canopy_unixbus_tx_catch_up(&self->tx);
+            if (left <= 0 || somebody_has_room(&behind)) {
+                left = canopy_unixbus_tx_catch_up(&self->tx, &behind);
                 catch_up_at = canopy_unixbus_now() + left;
             }
         } else {
-            clear(self->work);
+            behind.count = 0;
             catch_up_at = 0;
         }
         if (!taken) {
-            wait_for_work(self, failed && (left < 0 || left > RETRY_US) ? RETRY_US : left, !failed);
+            wait_for_work(self, &behind, failed && (left < 0 || left > RETRY_US) ? RETRY_US : left, !failed);
         }
     }
     return NULL;

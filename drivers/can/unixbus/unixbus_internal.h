@@ -7,6 +7,8 @@
 #ifndef CANOPY_UNIXBUS_INTERNAL_H
 #define CANOPY_UNIXBUS_INTERNAL_H
 
+#include <poll.h>
+
 #include "canopy/can/unixbus.h"
 
 #define CANOPY_UNIXBUS_HEADER 8u
@@ -60,11 +62,20 @@ void canopy_unixbus_tx_close(canopy_unixbus_tx_t *self);
 /** Sends a frame to everybody, without waiting for anybody. @return as canopy_can_t.send */
 int canopy_unixbus_tx_send(canopy_unixbus_tx_t *self, const canopy_can_frame_t *frame);
 
+/** Participants that are behind, for poll(). */
+typedef struct {
+    size_t count;
+    struct pollfd sockets[CANOPY_UNIXBUS_PEERS_MAX];
+} canopy_unixbus_waiting_t;
+
 /**
  * Offers participants that were full what they have not got yet.
- * @return after how long it has to be called again [us]; negative: everybody has got everything
+ *
+ * @param waiting[in,out] of the last call, as poll() has left it: who has room is not kept waiting; then those who are still
+ *                        behind
+ * @return after how long it has to be called again, if nobody has room before [us]; negative: everybody has got everything
  */
-int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self);
+int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self, canopy_unixbus_waiting_t *waiting);
 
 /** Waits, not for long, until everybody who takes frames has got all of them. */
 void canopy_unixbus_tx_finish(canopy_unixbus_tx_t *self);

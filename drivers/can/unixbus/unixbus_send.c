@@ -231,34 +231,49 @@ int canopy_unixbus_tx_send(canopy_unixbus_tx_t *self, const canopy_can_frame_t *
     return result;
 }
 
-/* The lock is given back after each participant: the loop waits for one of them at most. */
-int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self)
+static bool has_room(const canopy_unixbus_waiting_t *waiting, int socket)
 {
-    int64_t soonest = -1;
-    const int64_t now = canopy_unixbus_now();
+    for (size_t i = 0; i < waiting->count; i++) {
+        if (waiting->sockets[i].fd == socket) {
+            return waiting->sockets[i].revents != 0;
+        }
+    }
+    return false;
+}
 
+/* The lock is given back after each participant: the loop waits for one of them at most. */
+int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self, canopy_unixbus_waiting_t *waiting)
+{
+    static const int64_t never = INT64_MAX;
+    int64_t soonest = never;
+    const int64_t now = canopy_unixbus_now();
+    canopy_unixbus_waiting_t behind;
+    bool is_there = true;
+
+    behind.count = 0;
     atomic_store(&self->is_behind, false); /* set again by whoever is found behind, here or by the loop meanwhile */
-    for (size_t i = 0;;) {
+    for (size_t i = 0; is_there;) {
         (void)pthread_mutex_lock(&self->lock);
-        const bool is_there = i < self->folder.count;
         canopy_unixbus_peer_t *peer = &self->folder.peers[i];
-        if (is_there && peer->next != self->head && is_due(peer, now) && !serve(self, peer, now)) {
+        is_there = i < self->folder.count;
+        if (is_there && peer->next != self->head && (is_due(peer, now) || has_room(waiting, peer->socket)) &&
+            !serve(self, peer, now)) {
             canopy_unixbus_folder_forget(&self->folder, i); /* the last one has its place now */
         } else if (is_there) {
             if (peer->next != self->head) {
                 const int64_t left = peer->pause_us == 0u ? 0 : peer->retry_at - now;
-                soonest = soonest < 0 || left < soonest ? left : soonest;
+                soonest = left < soonest ? left : soonest;
+                behind.sockets[behind.count++] = (struct pollfd){.fd = peer->socket, .events = POLLOUT};
             }
             i++;
         }
         (void)pthread_mutex_unlock(&self->lock);
-        if (!is_there) {
-            break;
-        }
     }
-    if (soonest >= 0) {
-        atomic_store(&self->is_behind, true);
+    *waiting = behind;
+    if (soonest == never) {
+        return -1;
     }
+    atomic_store(&self->is_behind, true);
     return soonest;
 }
 
