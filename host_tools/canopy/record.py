@@ -37,7 +37,11 @@ _LINE_START, _CLEAR = Styled("\r"), Styled("\x1b[K")
 
 
 class RecordError(Exception):
-    """The log cannot be written; the text says why, and the way out."""
+    """The log cannot be made; the text says why, and the way out."""
+
+
+class LogFailedError(Exception):
+    """The log could not be written to its end; the text says why."""
 
 
 @dataclass
@@ -182,6 +186,7 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
 
     Raises:
         RecordError: It cannot be made.
+        LogFailedError: It cannot be completed at the end.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise RecordError(f"{path}: the suffix says the format, and must be one of {', '.join(SUFFIXES)}")
@@ -197,7 +202,10 @@ def open_log(path: Path, force: bool) -> Iterator[can.io.generic.MessageWriter]:
     try:
         yield writer
     finally:
-        writer.stop()
+        try:
+            writer.stop()
+        except OSError as error:
+            raise LogFailedError(f"{path}: {error}: what was recorded last is missing") from error
 
 
 def _channel(spec: str) -> str:
@@ -245,9 +253,7 @@ def _record(
         try:
             run(recorder, bus, stop, duration)
         except OSError as error:
-            voice.end()
-            echo(f"canopy record: {output}: {error}; {recorder.summary.text()} until then", err=True)
-            sys.exit(FAILED)
+            raise LogFailedError(f"{output}: {error}; {recorder.summary.text()} until then") from error
     voice.end()
     if not recorder.summary.frames:
         echo(f"canopy record: nothing came on {spec}; `canopy buses` lists the buses that there are", err=True)
@@ -301,6 +307,9 @@ def command(
     except (ModelError, RecordError, CanBusError, can.CanError, OSError) as error:
         echo(f"canopy record: {error}", err=True)
         sys.exit(NOTHING)
+    except LogFailedError as error:
+        echo(f"canopy record: {error}", err=True)
+        sys.exit(FAILED)
     summary = recorder.summary
     echo(dumps(asdict(summary)) if as_json else f"canopy record: {output}: {summary.text()}")
     differs = recorder.decoder is not None and recorder.decoder.mismatch is not None

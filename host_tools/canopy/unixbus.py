@@ -248,6 +248,8 @@ class UnixBus(can.BusABC):
                 self._sender.check()
             except LeftBusError as error:
                 raise _left(error) from error
+            except OSError as error:
+                raise can.CanOperationError(f"cannot look at the bus: {error}", error.errno) from error
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Sends a frame to all other participants.
@@ -272,6 +274,8 @@ class UnixBus(can.BusABC):
             lost = self._sender.send(datagram, patience_s)
         except LeftBusError as error:
             raise _left(error) from error
+        except OSError as error:
+            raise can.CanOperationError(f"cannot send: {error}", error.errno) from error
         self._sent += 1
         if self._receive_own_messages:
             self._receiver.put(_own_copy(msg, self.channel))

@@ -12,7 +12,6 @@ counted as a slip, never sent in a burst.
 
 from __future__ import annotations
 
-import errno
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -42,9 +41,6 @@ RENUMBER_AFTER = 8
 A controller answers a number once. When that answer was lost, or the simulator was started again at the number that it
 had left off at, no repeat would ever be answered.
 """
-
-NOT_OUT = {errno.ENOBUFS, errno.EAGAIN, errno.ENETDOWN}
-"""A frame that found the transmit buffer full, or the bus away: it is dropped, and the next one may do better."""
 
 
 class BusGoneError(Exception):
@@ -88,7 +84,7 @@ class Simulation:
     steps: int | None = None
     sent: int = 0
     dropped: int = 0
-    """Frames that found the bus's transmit buffer full, or the bus away."""
+    """Frames that found the bus's transmit buffer full, or the bus away, or that the system could not send."""
     received: int = 0
     slips: int = 0
     """Real time: cycles skipped because the process came more than a period late."""
@@ -186,7 +182,8 @@ class Simulation:
         try:
             self.bus.send(frame)
         except can.CanError as error:
-            if error.error_code not in NOT_OUT and "buffer full" not in str(error):
+            # An error of the system passes: the next frame may do better. Without one, no bus can carry the frame.
+            if error.error_code is None and "buffer full" not in str(error):
                 raise BusGoneError(f"cannot send on {self.bus.channel_info}: {error}") from error
             self.dropped += 1
         except OSError as error:

@@ -283,6 +283,12 @@ static int64_t nanoseconds(const struct timespec *time)
     return (int64_t)time->tv_sec * INT64_C(1000000000) + time->tv_nsec;
 }
 
+/** What cannot be read just now is no harm where it was read before. */
+static canopy_error_t passing(const canopy_unixbus_folder_t *folder, canopy_error_t error)
+{
+    return error == CANOPY_ERROR_IO && folder->was_read ? CANOPY_OK : error;
+}
+
 canopy_error_t canopy_unixbus_folder_refresh(canopy_unixbus_folder_t *folder, uint32_t next)
 {
     struct stat status;
@@ -292,7 +298,7 @@ canopy_error_t canopy_unixbus_folder_refresh(canopy_unixbus_folder_t *folder, ui
     }
     if (stat(folder->path, &status) != 0) {
         folder->settled = false;
-        return errno == ENOENT || errno == ENOTDIR ? CANOPY_ERROR_BUS_DOWN : CANOPY_OK;
+        return passing(folder, errno == ENOENT || errno == ENOTDIR ? CANOPY_ERROR_BUS_DOWN : CANOPY_ERROR_IO);
     }
     const int64_t modified = nanoseconds(&status.st_mtim);
     if (folder->settled && modified == nanoseconds(&folder->modified)) {
@@ -303,7 +309,8 @@ canopy_error_t canopy_unixbus_folder_refresh(canopy_unixbus_folder_t *folder, ui
     (void)clock_gettime(CLOCK_REALTIME, &now);
     const canopy_error_t error = read_folder(folder, next);
     folder->settled = error == CANOPY_OK && nanoseconds(&now) - modified > SETTLE_NS;
-    return error == CANOPY_ERROR_BUS_DOWN ? error : CANOPY_OK;
+    folder->was_read |= error == CANOPY_OK;
+    return passing(folder, error);
 }
 
 void canopy_unixbus_folder_forget(canopy_unixbus_folder_t *folder, size_t index)

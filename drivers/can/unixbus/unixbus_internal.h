@@ -37,7 +37,8 @@ canopy_error_t canopy_unixbus_folder_join(canopy_unixbus_folder_t *folder, int s
  * cannot read it just now, the list stays as it was and is read the next time.
  *
  * @param next number of the frame that newcomers get first
- * @return CANOPY_OK, or CANOPY_ERROR_BUS_DOWN: the folder or the own socket in it is gone.
+ * @return CANOPY_OK; CANOPY_ERROR_BUS_DOWN: the folder or the own socket in it is gone; CANOPY_ERROR_IO: it could never be
+ *         read yet, so that nobody knows who is there.
  */
 canopy_error_t canopy_unixbus_folder_refresh(canopy_unixbus_folder_t *folder, uint32_t next);
 

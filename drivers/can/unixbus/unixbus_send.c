@@ -299,7 +299,7 @@ void canopy_unixbus_tx_finish(canopy_unixbus_tx_t *self)
 bool canopy_unixbus_tx_is_joined(canopy_unixbus_tx_t *self)
 {
     (void)pthread_mutex_lock(&self->lock);
-    const bool result = canopy_unixbus_folder_refresh(&self->folder, self->head) == CANOPY_OK;
+    const bool result = canopy_unixbus_folder_refresh(&self->folder, self->head) != CANOPY_ERROR_BUS_DOWN;
     (void)pthread_mutex_unlock(&self->lock);
     return result;
 }

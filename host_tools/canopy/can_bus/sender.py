@@ -83,6 +83,7 @@ class Sender:
         self._head = 0
         self._modified_ns = 0
         self._settled = False
+        self._was_read = False
         self._is_catching_up = False
         self._closed = False
 
@@ -91,6 +92,7 @@ class Sender:
 
         Raises:
             LeftBusError: It is not.
+            OSError: The folder could not be read yet.
         """
         with self._lock:
             self._refresh()
@@ -107,6 +109,7 @@ class Sender:
 
         Raises:
             LeftBusError: The bus is gone.
+            OSError: The folder could not be read yet.
         """
         end = time.monotonic() + patience_s
         with self._lock:
@@ -232,7 +235,10 @@ class Sender:
             raise LeftBusError(error.errno, error.strerror, error.filename) from error
         except OSError:
             self._settled = False
+            if not self._was_read:  # nobody knows who is there
+                raise
             return
+        self._was_read = True
         self._modified_ns = modified_ns
         self._settled = now_ns - modified_ns > SETTLE_NS
         folder = str(self._own.parent)

@@ -31,6 +31,10 @@ LOOK_S = 0.5
 GAPS_MAX = 1000
 """The newest gaps are kept; all are counted."""
 
+FAILURES_MAX = 20
+"""Receives in a row that fail before the bus is opened again."""
+
+_OVER = {None, errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.EBADF}
 _NO_ROOM = {errno.ENOBUFS, errno.EAGAIN}
 
 
@@ -88,6 +92,7 @@ class SteadyBus(can.BusABC):
         self._away_wall = 0.0
         self._why, self._is_said = "", False
         self._retry_at = 0.0
+        self._failures = 0
         self._look_at = 0.0
         self._can_protocol = can.CanProtocol.CAN_FD if fd else can.CanProtocol.CAN_20
         self.channel_info = spec
@@ -138,8 +143,14 @@ class SteadyBus(can.BusABC):
         try:
             message = self._inner.recv(timeout)
         except (can.CanError, OSError, ValueError) as error:  # ValueError: select() on a socket that is closed
-            self._go_away(self._reason(error))
+            self._failures += 1
+            if self._failures >= FAILURES_MAX or self._is_over(error):
+                self._go_away(self._reason(error))
+            else:  # for want of memory, for example: it passes
+                self._voice.say(f"{self._spec}: {error}", "receive")
+                time.sleep(min(timeout, RETRY_S))
             return None
+        self._failures = 0
         now = time.monotonic()
         if message is None and self._kind == "socketcan" and now >= self._look_at:
             self._look_at = now + LOOK_S
@@ -161,8 +172,8 @@ class SteadyBus(can.BusABC):
             self._inner.send(msg, timeout)
         except (can.CanError, OSError) as error:
             number = error.error_code if isinstance(error, can.CanError) else error.errno
-            if number is None or number in _NO_ROOM:
-                raise
+            if number is None or number in _NO_ROOM or not self._is_over(error):
+                raise can.CanOperationError(str(error), number) from error
             self._go_away(self._reason(error))
             raise can.CanOperationError(f"{self._spec} {self._why}", errno.ENETDOWN) from error
 
@@ -193,6 +204,14 @@ class SteadyBus(can.BusABC):
             bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._receive_buffer)
         self._inner = bus
         self._look_at = time.monotonic() + LOOK_S
+        self._failures = 0
+
+    def _is_over(self, error: Exception) -> bool:
+        """Whether only opening the bus again can help."""
+        number = error.error_code if isinstance(error, can.CanError) else getattr(error, "errno", None)
+        if self._kind == "socketcan":
+            return number in _OVER or is_up(self._channel) is not True
+        return number in (None, errno.ENOENT, errno.ENOTDIR)
 
     def _reason(self, error: Exception) -> str:
         if self._kind == "socketcan":

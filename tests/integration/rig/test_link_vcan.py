@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A link that goes down and up, and an interface that is taken away and made anew: no program ends, and each says so."""
+"""A link that goes down and up, an interface that is taken away and made anew: no program ends, each says so."""
 
 from __future__ import annotations
 

@@ -78,6 +78,7 @@ typedef struct {
     struct sockaddr_un own;
     struct timespec modified; /* the folder's mtime when it was read */
     bool settled;             /* mtime was old enough then that no later change can bear the same */
+    bool was_read;            /* at least once since the bus was joined */
     bool too_many;
     size_t count;
     canopy_unixbus_peer_t peers[CANOPY_UNIXBUS_PEERS_MAX];
@@ -133,7 +134,8 @@ typedef struct {
  *         errno (EPERM: the default folder belongs to somebody else or can be written by others; EUSERS: the bus has
  *         CANOPY_UNIXBUS_PEERS_MAX participants).
  *
- * Later errors: CANOPY_ERROR_BUS_DOWN from send: the folder or the own socket in it was deleted.
+ * Later errors: CANOPY_ERROR_BUS_DOWN from send: the folder or the own socket in it was deleted; CANOPY_ERROR_IO: it could
+ * not be read yet.
  */
 canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, const canopy_can_acceptance_t *acceptance);
 
