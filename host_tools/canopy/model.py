@@ -7,6 +7,7 @@ Every host tool reads this one file, `<application>.model.json`, and the DBC tha
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,12 +30,20 @@ TRACE_MESSAGES = (
 PERIOD_US_MAX = 3_600_000_000
 ID_MAX = 2**29 - 1
 LINE_MAX = 2**31 - 1
+_TEXT_MAX = 1000
 
 T = TypeVar("T")
 
 
 class ModelError(ValueError):
-    """The model file cannot be used; the text names the file, the place in it, and the way out."""
+    """The model file cannot be used; the text names the file, the place in it, and the way out.
+
+    What is in the file may be long: the middle of a long text is left out.
+    """
+
+    def __init__(self, text: str) -> None:
+        half = _TEXT_MAX // 2
+        super().__init__(text if len(text) <= _TEXT_MAX else f"{text[:half]} … {text[-half:]}")
 
 
 @dataclass(frozen=True)
@@ -93,9 +102,10 @@ def load_model(path: Path) -> Model:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ModelError(f"{path}: is no JSON: {error}") from error
-    model = _Reader(path, data).model()
-    if not model.dbc.is_file():
-        raise ModelError(f"{path}: bus.dbc: {model.dbc} is not there; it is written beside the model file")
+    reader = _Reader(path, data)
+    model = reader.model()
+    if not os.path.isfile(model.dbc):  # Path.is_file() raises where the name is too long
+        raise reader.error("bus.dbc", f"{model.dbc} is not there; it is written beside the model file")
     return model
 
 
@@ -109,7 +119,7 @@ class _Reader:
     def model(self) -> Model:
         data = self._object(self._data, "the file")
         if self._get(data, "", "format", int) != FORMAT:
-            raise self._error("format", f"is {data['format']}, these tools read {FORMAT}: build the application again")
+            raise self.error("format", f"is {data['format']}, these tools read {FORMAT}: build the application again")
         tree = self._get(data, "", "tree", dict)
         bus = self._get(data, "", "bus", dict)
         period_us = self._number(data, "", "period_us", 1, PERIOD_US_MAX)
@@ -131,12 +141,12 @@ class _Reader:
     def _hash(self, data: dict[str, Any]) -> str:
         value = self._get(data, "", "hash", str)
         if re.fullmatch("[0-9a-f]{16}", value) is None:
-            raise self._error("hash", f"is '{value}', must be 16 hexadecimal digits")
+            raise self.error("hash", f"is '{value}', must be 16 hexadecimal digits")
         return value
 
     def _nodes(self, items: list[Any]) -> tuple[Node, ...]:
         if not items:
-            raise self._error("tree.nodes", "is empty")
+            raise self.error("tree.nodes", "is empty")
         nodes: list[Node] = []
         open_nodes: list[Node] = []  # the ancestors of the node at hand
         for index, item in enumerate(items):
@@ -146,9 +156,9 @@ class _Reader:
             parent = open_nodes[-1] if open_nodes else None
             limit = parent.end if parent else len(items)
             if node.index != index or node.parent != (parent.index if parent else None) or (index and not parent):
-                raise self._error(f"tree.nodes[{index}]", "is not in depth-first order (index, parent, end)")
+                raise self.error(f"tree.nodes[{index}]", "is not in depth-first order (index, parent, end)")
             if not index < node.end <= limit:
-                raise self._error(f"tree.nodes[{index}].end", f"is {node.end}, must be {index + 1}…{limit}")
+                raise self.error(f"tree.nodes[{index}].end", f"is {node.end}, must be {index + 1}…{limit}")
             nodes.append(node)
             open_nodes.append(node)
         return tuple(nodes)
@@ -167,20 +177,20 @@ class _Reader:
             line=self._number(data, place, "line", 0, LINE_MAX),
         )
         if node.category not in CATEGORIES:
-            raise self._error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
+            raise self.error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
         return node
 
     def _trace(self, data: dict[str, Any]) -> dict[str, int]:
         if "CanopyTick" not in data:
-            raise self._error("trace", "has no CanopyTick: the DBC has no trace messages, so nothing can be watched")
+            raise self.error("trace", "has no CanopyTick: the DBC has no trace messages, so nothing can be watched")
         trace = {name: self._number(data, "trace.", name, 0, ID_MAX) for name in TRACE_MESSAGES if name in data}
         if len(set(trace.values())) != len(trace):
-            raise self._error("trace", "gives two messages the same id")
+            raise self.error("trace", "gives two messages the same id")
         return trace
 
     def _name(self, value: Any, place: str) -> str:
         if not isinstance(value, str):
-            raise self._error(place, f"is {value!r}, must be a text")
+            raise self.error(place, f"is {value!r}, must be a text")
         return value
 
     def _list(self, data: dict[str, Any], where: str, key: str, item: Callable[[Any, str], T]) -> tuple[T, ...]:
@@ -189,22 +199,23 @@ class _Reader:
 
     def _object(self, value: Any, place: str) -> dict[str, Any]:
         if not isinstance(value, dict):
-            raise self._error(place, "must be a JSON object")
+            raise self.error(place, "must be a JSON object")
         return value
 
     def _get(self, data: dict[str, Any], where: str, key: str, kind: type[T]) -> T:
         value = data.get(key)
         if key not in data:
-            raise self._error(f"{where}{key}", "is missing")
+            raise self.error(f"{where}{key}", "is missing")
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
-            raise self._error(f"{where}{key}", f"is {value!r}, must be of type {kind.__name__}")
+            raise self.error(f"{where}{key}", f"is {value!r}, must be of type {kind.__name__}")
         return value
 
     def _number(self, data: dict[str, Any], where: str, key: str, low: int, high: int) -> int:
         value = self._get(data, where, key, int)
         if not low <= value <= high:
-            raise self._error(f"{where}{key}", f"is {str(value)[:30]}, must be {low} to {high}")
+            raise self.error(f"{where}{key}", f"is {str(value)[:30]}, must be {low} to {high}")
         return value
 
-    def _error(self, place: str, text: str) -> ModelError:
+    def error(self, place: str, text: str) -> ModelError:
+        """What is wrong at a place of the file."""
         return ModelError(f"{self._path}: {place}: {text}")

@@ -61,6 +61,8 @@ class Summary:
     """With a model: trace frames that are missing in the log, whoever lost them."""
     starts: int | None = None
     """With a model: how often the controller's first tick was recorded. A replay begins there."""
+    disagreements: int | None = None
+    """With a model: how often a CanopyModel began to claim another tree."""
     outages: int = 0
     """How often the bus was away: down, gone, or failed."""
     away_s: float = 0.0
@@ -74,6 +76,8 @@ class Summary:
             text += f", {self.outages} gaps of {self.away_s:.1f} s in all"
         if self.ticks is not None:
             text += f"; {self.ticks} ticks, {self.trace_lost} trace frames lost, {self.starts} starts of the controller"
+        if self.disagreements:
+            text += f"; {self.disagreements} claims of another tree than the model's"
         return text
 
 
@@ -91,8 +95,9 @@ class Recorder:
         self._started = time.monotonic()
         self._last_tick: int | None = None
         self._told: set[str] = set()
+        self._claim: str | None = None
         if model is not None:
-            self.summary.ticks = self.summary.trace_lost = self.summary.starts = 0
+            self.summary.ticks = self.summary.trace_lost = self.summary.starts = self.summary.disagreements = 0
             missing = [name for name in NEEDED if name not in model.trace]
             if missing:
                 self._tell(
@@ -107,7 +112,8 @@ class Recorder:
         self.summary.frames += 1
         self.summary.error_frames += message.is_error_frame
         if self.decoder is not None and is_plain_data(message):
-            self._count(self.decoder, self.decoder.feed(message.arbitration_id, bytes(message.data)))
+            self._count(self.decoder.feed(message.arbitration_id, bytes(message.data)))
+            self._compare(self.decoder.mismatch)
 
     def mark(self, gap: Gap) -> None:
         """Writes where nothing could be recorded: an error frame at its end, with "GAP" and its length [ms] as data."""
@@ -138,10 +144,15 @@ class Recorder:
             summary.trace_lost = decoder.lost
             if decoder.lost:
                 self._tell("trace frames are lost on the way; the log cannot be replayed from there on")
-            if decoder.mismatch is not None:
-                self._tell(decoder.mismatch)
 
-    def _count(self, decoder: TraceDecoder, views: tuple[TreeView, ...]) -> None:
+    def _compare(self, claim: str | None) -> None:
+        """A CanopyModel that is not the model's: anybody can send one, on a bus."""
+        if claim is not None and claim != self._claim:
+            self.summary.disagreements = (self.summary.disagreements or 0) + 1
+            self._voice.say(claim, "model")
+        self._claim = claim
+
+    def _count(self, views: tuple[TreeView, ...]) -> None:
         assert self.summary.ticks is not None
         assert self.summary.starts is not None
         for view in views:
@@ -298,8 +309,8 @@ def command(
     the unixbus, --create makes it before. It only listens. Progress and what was lost are shown on stderr. A bus that
     is down or gone is waited for, and the gap is marked in the log. Runs until Ctrl-C; a summary is printed at the end.
 
-    Exit status: 0 recorded, 1 nothing came, or the bus or the file cannot be used, or the model is not the
-    controller's, 2 wrong command line, 3 an error ended it, e.g. a full disk.
+    Exit status: 0 recorded, 1 nothing came, or the bus, the file or the model cannot be used, 2 wrong command line,
+    3 an error ended it, e.g. a full disk.
     """
     try:
         model = load_model(model_path) if model_path is not None else None
@@ -312,5 +323,4 @@ def command(
         sys.exit(FAILED)
     summary = recorder.summary
     echo(dumps(asdict(summary)) if as_json else f"canopy record: {output}: {summary.text()}")
-    differs = recorder.decoder is not None and recorder.decoder.mismatch is not None
-    sys.exit(NOTHING if differs or not summary.frames else DONE)
+    sys.exit(DONE if summary.frames else NOTHING)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from canopy.escape.terminal import echo
 from canopy.lcm_link import CHANNEL_ROBOT, CHANNEL_ROBOT_COMMAND, open_lcm, utime_now
+from canopy.process.say import Voice
 from canopy_sim.robot import CommandKind, DeskCommand, RobotState
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class LcmSide:
         self._state_type = robot_state_t
         self._link = link
         self._execute = execute
+        self._voice = Voice("canopy-sim")
         self.published = 0
         self.commands = 0
         self.refused = 0
@@ -79,7 +80,7 @@ class LcmSide:
             self._execute(command)
         except Exception as error:  # decode() raises whatever struct raises; nothing on LCM may end the robot
             self.refused += 1
-            echo(f"canopy-sim: {CHANNEL_ROBOT_COMMAND} refused: {error}", err=True)
+            self._voice.say(f"{CHANNEL_ROBOT_COMMAND} refused: {error}", "refused")
         else:
             self.commands += 1
 

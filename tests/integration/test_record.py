@@ -244,7 +244,7 @@ def test_another_controllers_model_is_said_but_the_record_goes_on(bus: str, send
         sender.send(logs.frame(0x605, bytes.fromhex("785634120700") + bytes(2)))
         sender.send(logs.frame(0x123))
         data = record.end()
-    assert (record.process.returncode, data["frames"]) == (1, 2)
+    assert (record.process.returncode, data["frames"], data["disagreements"]) == (0, 2, 1)
     assert "is not the model of the tree that the controller runs: that one has 7 nodes and the hash 12345678…" in (
         record.said
     )
