@@ -361,13 +361,9 @@ static void ages_are_whole_milliseconds_rounded_up(void)
 static void a_value_whose_age_cannot_be_told_is_not_fresh(void)
 {
     const canopy_time_t now = UINT64_C(1) << 40;
-    const canopy_rx_message_t patient[] = {{.id = SPEED_ID,
-                                            .length = 3,
-                                            .data_id = 1,
-                                            .timeout = 100000000,
-                                            .decode = decode_speed,
-                                            .set_age = speed_age},
-                                           rx[1]};
+    const canopy_rx_message_t patient[] = {
+        {.id = SPEED_ID, .length = 3, .data_id = 1, .timeout = 100000000, .decode = decode_speed, .set_age = speed_age},
+        rx[1]};
     canopy_bus_t patient_tables = tables;
 
     patient_tables.rx = patient;

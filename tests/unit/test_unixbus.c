@@ -135,8 +135,8 @@ static int bare_socket(const char *name)
 static void send_bytes(const void *bytes, size_t size)
 {
     const int descriptor = new_socket();
-    TEST_ASSERT_EQUAL((ssize_t)size,
-                      sendto(descriptor, bytes, size, 0, (const struct sockaddr *)&a.tx.folder.own, sizeof a.tx.folder.own));
+    TEST_ASSERT_EQUAL((ssize_t)size, sendto(descriptor, bytes, size, 0, (const struct sockaddr *)&a.tx.folder.own,
+                                            sizeof a.tx.folder.own));
     (void)close(descriptor);
 }
 
@@ -447,7 +447,7 @@ static void test_a_bus_has_only_so_many_participants(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_IO, canopy_unixbus_open(&b, "bus0", CANOPY_CAN_ACCEPT_EVERYTHING));
     TEST_ASSERT_EQUAL(EUSERS, errno);
     TEST_ASSERT_EQUAL(CANOPY_UNIXBUS_PEERS_MAX, each_file(NULL)); /* it has left nothing behind */
-    (void)close(peers[7]);                                       /* dies */
+    (void)close(peers[7]);                                        /* dies */
     open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
     TEST_ASSERT_EQUAL(1, send_id(&b, 0x55));
     TEST_ASSERT_EQUAL_HEX32(0x55, receive_waiting(&a).id);

@@ -221,8 +221,7 @@ static void unixbus_stats(void *context, canopy_can_stats_t *stats)
     *stats = (canopy_can_stats_t){
         .received = self->received,
         .sent = sent,
-        .rx_dropped =
-            canopy_ring_dropped(&self->queue) + atomic_load_explicit(&self->lost, memory_order_relaxed),
+        .rx_dropped = canopy_ring_dropped(&self->queue) + atomic_load_explicit(&self->lost, memory_order_relaxed),
         .tx_dropped = tx_dropped,
         .error_frames = atomic_load_explicit(&self->error_frames, memory_order_relaxed),
         .rx_high_water = canopy_ring_high_water(&self->queue),

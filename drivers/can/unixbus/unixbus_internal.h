@@ -43,7 +43,8 @@ canopy_error_t canopy_unixbus_folder_join(canopy_unixbus_folder_t *folder, int s
 canopy_error_t canopy_unixbus_folder_refresh(canopy_unixbus_folder_t *folder, uint32_t next);
 
 /** Writes the path of a socket in the folder. @return false: it is too long for one */
-bool canopy_unixbus_folder_address(const canopy_unixbus_folder_t *folder, const char *name, struct sockaddr_un *address);
+bool canopy_unixbus_folder_address(const canopy_unixbus_folder_t *folder, const char *name,
+                                   struct sockaddr_un *address);
 
 /** Takes a participant out of the list (its place is taken by the last one). */
 void canopy_unixbus_folder_forget(canopy_unixbus_folder_t *folder, size_t index);

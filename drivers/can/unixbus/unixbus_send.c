@@ -80,6 +80,7 @@ static delivery_t connect_to(canopy_unixbus_peer_t *peer, const struct sockaddr_
 {
     struct stat status;
     if (lstat(address->sun_path, &status) == 0 && !S_ISSOCK(status.st_mode)) {
+        errno = ENOTSOCK;
         return GONE;
     }
     const int made = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);

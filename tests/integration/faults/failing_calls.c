@@ -49,8 +49,8 @@ static void report(long count)
             path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
         const int size = snprintf(text, sizeof text, "%ld", count);
         if (file >= 0) {
-            const ssize_t written = ((ssize_t(*)(int, const void *, size_t))dlsym(RTLD_NEXT, "write"))(file, text,
-                                                                                                        (size_t)size);
+            const ssize_t written =
+                ((ssize_t (*)(int, const void *, size_t))dlsym(RTLD_NEXT, "write"))(file, text, (size_t)size);
             (void)written;
             (void)close(file);
         }
@@ -91,23 +91,27 @@ static bool counts(int descriptor)
         return false;
     }
     target[size] = '\0';
-    return strncmp(target, "socket:", 7) == 0 || strstr(target, "eventfd") != NULL || (getenv("FAIL_PATH") != NULL && is_ours(target));
+    return strncmp(target, "socket:", 7) == 0 || strstr(target, "eventfd") != NULL ||
+           (getenv("FAIL_PATH") != NULL && is_ours(target));
 }
 
+/* NOLINTBEGIN(bugprone-macro-parentheses): types and lists of parameters cannot be put in parentheses */
 /* A function of the C library with the same name: fails when `condition` holds and it is its turn. */
-#define WRAP(type, failed, name, parameters, arguments, condition)                                                     \
-    type name parameters;                                                                                              \
-    type name parameters                                                                                               \
-    {                                                                                                                  \
-        static type(*next) parameters;                                                                                 \
-        if (next == NULL) {                                                                                            \
-            next = (type(*) parameters)dlsym(RTLD_NEXT, #name);                                                        \
-        }                                                                                                              \
-        if ((condition) && fails(#name)) {                                                                             \
-            return failed;                                                                                             \
-        }                                                                                                              \
-        return next arguments;                                                                                         \
+#define WRAP(type, failed, name, parameters, arguments, condition) \
+    type name parameters;                                          \
+    type name parameters                                           \
+    {                                                              \
+        static type(*next) parameters;                             \
+        if (next == NULL) {                                        \
+            next = (type(*) parameters)dlsym(RTLD_NEXT, #name);    \
+        }                                                          \
+        if ((condition) && fails(#name)) {                         \
+            return failed;                                         \
+        }                                                          \
+        return next arguments;                                     \
     }
+
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 WRAP(int, -1, socket, (int family, int type, int protocol), (family, type, protocol), true)
 WRAP(int, -1, bind, (int fd, const struct sockaddr *a, socklen_t size), (fd, a, size), true)
@@ -123,7 +127,8 @@ WRAP(ssize_t, -1, recvfrom, (int fd, void *b, size_t s, int f, struct sockaddr *
 WRAP(ssize_t, -1, recvmsg, (int fd, struct msghdr *m, int f), (fd, m, f), counts(fd))
 WRAP(ssize_t, -1, read, (int fd, void *b, size_t s), (fd, b, s), counts(fd))
 WRAP(ssize_t, -1, write, (int fd, const void *b, size_t s), (fd, b, s), counts(fd))
-WRAP(int, -1, recvmmsg, (int fd, struct mmsghdr *m, unsigned n, int f, struct timespec *t), (fd, m, n, f, t), counts(fd))
+WRAP(int, -1, recvmmsg, (int fd, struct mmsghdr *m, unsigned n, int f, struct timespec *t), (fd, m, n, f, t),
+     counts(fd))
 WRAP(int, -1, getsockopt, (int fd, int l, int o, void *v, socklen_t *s), (fd, l, o, v, s), true)
 WRAP(unsigned, 0u, if_nametoindex, (const char *name), (name), true)
 WRAP(int, -1, poll, (struct pollfd * p, nfds_t n, int t), (p, n, t), true)
@@ -146,6 +151,7 @@ WRAP(int, errno, pthread_create, (pthread_t * t, const pthread_attr_t *a, void *
      true)
 
 /* Its argument is whatever the request says; the callers here hand over a pointer. */
+/* NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name): the system's are reserved */
 int ioctl(int descriptor, unsigned long request, ...)
 {
     static int (*next)(int, unsigned long, ...);

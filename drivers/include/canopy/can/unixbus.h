@@ -114,7 +114,7 @@ typedef struct {
     atomic_bool stopping;
     atomic_int failure; /* errno of a receive that failed, until it was told */
     _Atomic uint32_t malformed;
-    _Atomic uint32_t lost; /* frames that senders say this participant has lost */
+    _Atomic uint32_t lost;    /* frames that senders say this participant has lost */
     canopy_arrival_t arrival; /* the thread's */
     _Atomic uint32_t error_frames;
     uint32_t received;
