@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage figures golden fuzz proof test-portable mutation mutation-sample long-run kill-run
+.PHONY: coverage figures golden fuzz proof test-logic test-portable test-trace mutation mutation-sample long-run kill-run
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -44,7 +44,7 @@ test-firmware: # the same tests as firmware in QEMU, and the sizes of the code f
 	cmake --build --preset firmware-m4 --target sizes
 
 test-python: # Python and integration tests that need no CAN interface
-	$(PYTEST) -m "not rig and not clang"
+	$(PYTEST) -m "not rig and not clang and not logic"
 
 test-rig: # integration tests on vcan0: one guest for all of them
 	$(PYTHON) tests/rig/with-vcan --timeout 1800 --mem 1G -- $(PYTEST) -m rig
@@ -70,7 +70,7 @@ format: ## let clang-format and ruff rewrite the sources
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,plot,test,verify,differential
-	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-portable coverage test-differential test-asan mutation-sample fuzz
+	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-logic test-portable coverage test-differential test-asan mutation-sample fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
 	$(call BUILD,clang)
@@ -80,22 +80,36 @@ test-clang: # the unit tests, and the tests of generated C that need a second co
 test-portable: # 32 bit, big-endian, and the sanitizers there and with clang: the unit tests
 	@for preset in $(PORTABLE); do $(call BUILD,$$preset) && ctest --preset $$preset || exit 1; done
 
-coverage: ## lines, branches and MC/DC of the runtime under the unit tests; fails below 100 %
+coverage: ## lines, branches and MC/DC of the runtime under the unit tests without threads; fails below 100 %
 	$(SETUP)/ensure-packages coverage
 	$(SETUP)/make-venv can,lcm,test
 	$(call BUILD,coverage)
 	rm -rf build/coverage/profiles
-	LLVM_PROFILE_FILE="$(CURDIR)/build/coverage/profiles/%m-%p.profraw" ctest --preset coverage
+	LLVM_PROFILE_FILE="$(CURDIR)/build/coverage/profiles/%m-%p.profraw" ctest --preset coverage -E _threads # they cover by chance
 	$(PYTHON) tests/coverage/report.py build/coverage runtime
 
 test-differential: # 20,000 random trees against the model and BehaviorTree.CPP, with a new seed unless one is given
 	$(call BUILD,host)
 	CANOPY_TREES=$${CANOPY_TREES:-20000} CANOPY_SEED=$${CANOPY_SEED:-$$(date +%s)} $(PYTEST) tests/differential
 
+test-trace: # a million ticks of the trace with losses, for both decoders; in CI 20,000 and 30,000
+	$(call BUILD,host)
+	CANOPY_TRACE_TICKS=$${CANOPY_TRACE_TICKS:-1000000} $(PYTEST) --timeout 3600 tests/integration/test_trace.py tests/integration/test_trace_decoders.py
+
+test-logic: # canopy verify --never and --always: circuits, and what berkeley-abc says of them
+	$(SETUP)/ensure-packages logic
+	$(SETUP)/make-venv can,lcm,test,verify,differential
+	$(PYTEST) -m logic tests/logic
+
+test-trace: # the trace with losses: a million ticks for each way to lose frames, and a million in both decoders
+	$(call BUILD,host)
+	seed=$${CANOPY_SEED:-$$(date +%s)}; build/host/tests/trace/trace_trial 7000000 $$seed && \
+	CANOPY_TRACE_TICKS=1000000 CANOPY_SEED=$$seed $(PYTEST) -s tests/integration/test_trace_decoders.py
+
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
-	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang" tests/integration tests/differential
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang and not logic" tests/integration tests/differential
 
 mutation: ## change the runtime a little, 3,000 times, and see whether a unit test notices (an hour on two idle cores)
 	$(call BUILD,asan)

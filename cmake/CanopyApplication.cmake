@@ -3,6 +3,7 @@
 #                        [MAIN_TREE id] [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
 #                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
+#                        [TRACE id [TRACE_ENTRIES all|marked|none] [TRACE_GUARD data_id]]
 #                        [BITRATE bit/s] [FOREIGN_LOAD percent] [FOREIGN_BURST frames] [TX_LATENCY_US us]
 #                        [MAX_RAM bytes] [MAX_FLASH bytes])
 #
@@ -37,7 +38,7 @@ set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
-                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
+                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;TRACE;TRACE_ENTRIES;TRACE_GUARD;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
                         "LEAVES;TYPE_MAP;ROS_PACKAGE")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
@@ -55,8 +56,12 @@ function(canopy_add_application NAME)
   set(sources "${folder}/${NAME}_app.c" "${folder}/${NAME}_bus.c")
   set(headers "${folder}/${NAME}_app.h" "${folder}/${NAME}_leaves.h" "${folder}/${NAME}_bus.h")
   set(options "")
-  foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US MAX_RAM MAX_FLASH IMAGE_NODES
-                 IMAGE_USES)
+  set(trace_dbc "")
+  if(DEFINED APP_TRACE)
+    set(trace_dbc "${folder}/${NAME}_trace.dbc")
+  endif()
+  foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US TRACE TRACE_ENTRIES TRACE_GUARD
+                 MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
     if(DEFINED APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")
@@ -79,7 +84,7 @@ function(canopy_add_application NAME)
     list(APPEND options --ros-package "${CMAKE_MATCH_1}=${CMAKE_MATCH_2}")
   endforeach()
   add_custom_command(
-    OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}"
+    OUTPUT ${sources} ${headers} "${folder}/${NAME}.model.json" "${folder}/${dbc_name}" ${trace_dbc}
     COMMAND "${CANOPY_PYTHON}" -I -m canopy compile # -I: the folder `canopy` of a build is no package
             "${APP_TREE}" --name "${NAME}" --dbc "${APP_DBC}" --node "${APP_NODE}"
             --period-ms "${APP_PERIOD_MS}" --output "${folder}" --depfile "${folder}.d" ${options}

@@ -209,7 +209,7 @@ static bool open_bus(canopy_loop_config_t *config, char *message, size_t size)
     if (options.replay != NULL) {
         config->can = &replay.replay.can;
         config->clock = &replay.replay.clock;
-        return canopy_replay_open(&replay, options.replay, options.sent, CANOPY_APP.trace, message, size) == CANOPY_OK;
+        return canopy_replay_open(&replay, options.replay, options.sent, message, size) == CANOPY_OK;
     }
     if (options.lock_step) {
         with_step.next = acceptance;

@@ -15,21 +15,21 @@ import click
 
 from canopy.can_bus.steady import SteadyBus
 from canopy.canbus import CanBusError, is_plain_data
-from canopy.escape import lcm_text
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo
 from canopy.lcm_link import CHANNEL_TREE, CHANNEL_TREE_STRUCTURE, DEFAULT_URL, open_lcm, utime_now
-from canopy.model import CATEGORIES, Model, ModelError, load_model
+from canopy.live.lcm_messages import status_message, structure_message
+from canopy.live.rest_of_tick import RestOfTick
+from canopy.model import Model, ModelError, load_model
 from canopy.process.say import Voice
 from canopy.process.status import NOTHING
 from canopy.stop import StopFlag
-from canopy.trace import Health, TraceDecoder, TreeView
+from canopy.trace import TraceDecoder, TreeView
 
 if TYPE_CHECKING:
     import lcm
 
 _POLL_S = 0.1
-_SILENT_PERIODS = 2
 
 
 @dataclass
@@ -47,6 +47,8 @@ class Summary:
     ticks_missed: int = 0
     restarts: int = 0
     refused: int = 0
+    crc_errors: int = 0
+    """Of these: CanopyTick frames with a wrong CRC, where they are protected."""
     overruns: int = 0
     disagreements: int = 0
     """How often a CanopyModel began to claim another tree than the model's."""
@@ -71,13 +73,16 @@ class Bridge:
         self._decoder = TraceDecoder(model)
         self._structure_period = structure_period
         self._structure_due = 0.0
-        self._last_frame = 0.0
+        self._rest = RestOfTick(model)
         self._voice = voice
         self._claim: str | None = None
 
     def feed(self, identifier: int, data: bytes, utime: int) -> None:
         """Takes one data frame that was received at `utime` [µs since 1970]."""
-        self._last_frame = time.monotonic()
+        now = time.monotonic()
+        if self._rest.is_over(now):
+            self._take(self._decoder.flush(), utime)
+        self._rest.saw(identifier, now)
         self._take(self._decoder.feed(identifier, data), utime)
         self._compare()
 
@@ -92,7 +97,7 @@ class Bridge:
     def idle(self) -> None:
         """Call this often: sends what is due, and gives up waiting for frames that no longer come."""
         now = time.monotonic()
-        if now - self._last_frame > _SILENT_PERIODS * self._model.period_us / 1e6:
+        if self._rest.is_over(now):
             self._take(self._decoder.flush(), utime_now())
         if now >= self._structure_due:
             self._structure_due = now + self._structure_period
@@ -102,7 +107,7 @@ class Bridge:
     def end(self) -> Summary:
         """Publishes the rest, and sums up."""
         self._take(self._decoder.flush(), utime_now())
-        for name in ("lost", "ticks_missed", "restarts", "refused"):
+        for name in ("lost", "ticks_missed", "restarts", "refused", "crc_errors"):
             setattr(self.summary, name, getattr(self._decoder, name))
         return self.summary
 
@@ -131,45 +136,6 @@ class Bridge:
             self.summary.publish_failed += 1
         else:
             self.summary.published += 1
-
-
-def status_message(model: Model, view: TreeView, utime: int) -> Any:
-    """A tree_status_t."""
-    from canopy_msgs.tree_status_t import tree_status_t
-
-    health = view.health or Health()
-    message = tree_status_t()
-    message.utime = utime
-    message.application = lcm_text.text(model.application)
-    message.model_hash = model.hash
-    message.tick = view.tick
-    message.num_nodes = len(view.statuses)
-    message.status = view.statuses
-    message.root_status = view.root_status
-    message.overruns = min(view.overruns, 2**31 - 1)
-    message.trace_lost = view.lost
-    message.rx_rejected = health.rx_rejected
-    message.rx_unknown = health.rx_unknown
-    message.tx_dropped = health.tx_dropped
-    message.faults = health.faults
-    return message
-
-
-def structure_message(model: Model) -> Any:
-    """A tree_structure_t."""
-    from canopy_msgs.tree_structure_t import tree_structure_t
-
-    message = tree_structure_t()
-    message.utime = utime_now()
-    message.application = lcm_text.text(model.application)
-    message.model_hash = model.hash
-    message.tree_id = lcm_text.text(model.tree_id)
-    message.num_nodes = len(model.nodes)
-    message.parent = [-1 if node.parent is None else node.parent for node in model.nodes]
-    message.type = [lcm_text.text(node.type) for node in model.nodes]
-    message.name = [lcm_text.text(node.name) for node in model.nodes]
-    message.category = [CATEGORIES.index(node.category) for node in model.nodes]
-    return message
 
 
 def run(bridge: Bridge, bus: SteadyBus, stop: StopFlag, duration: float | None) -> None:

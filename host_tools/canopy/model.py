@@ -11,26 +11,22 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
 
 from canopy.files import FileError, read_text
+from canopy.live.trace_model import MESSAGES, TYPES, VERSION, Trace, TraceValue
 
-FORMAT = 1
+FORMAT = 2
 CATEGORIES = ("control", "decorator", "condition", "action")
-TRACE_MESSAGES = (
-    "CanopyTick",
-    "CanopyInputs",
-    "CanopyArrivals",
-    "CanopyChange",
-    "CanopySnapshot",
-    "CanopyHealth",
-    "CanopyModel",
-)
 PERIOD_US_MAX = 3_600_000_000
-ID_MAX = 2**29 - 1
 LINE_MAX = 2**31 - 1
 _TEXT_MAX = 1000
+DATA_ID_MAX = 0xFFFF
+SLOTS_MAX = 4096
+CHANGES_MAX = 32
+KNOWN_MS_MAX = 2**53
 
 T = TypeVar("T")
 
@@ -75,8 +71,7 @@ class Model:
     send: tuple[str, ...]
     dbc_hash: str | None
     """Of the DBC that the firmware was built with; None: not known."""
-    trace: dict[str, int]
-    """Arbitration id of each trace message the DBC has; always CanopyTick."""
+    trace: Trace
 
     def depth(self, index: int) -> int:
         """Number of ancestors of a node; 0 for the root."""
@@ -115,11 +110,14 @@ class _Reader:
     def __init__(self, path: Path, data: Any) -> None:
         self._path = path
         self._data = data
+        self._node_count = 0
 
     def model(self) -> Model:
         data = self._object(self._data, "the file")
         if self._get(data, "", "format", int) != FORMAT:
-            raise self.error("format", f"is {data['format']}, these tools read {FORMAT}: build the application again")
+            raise self.error(
+                "format", f"is {data['format']}, these tools read {FORMAT}: {self._way_out(data['format'])}"
+            )
         tree = self._get(data, "", "tree", dict)
         bus = self._get(data, "", "bus", dict)
         period_us = self._number(data, "", "period_us", 1, PERIOD_US_MAX)
@@ -135,7 +133,7 @@ class _Reader:
             bus_node=self._get(bus, "bus.", "node", str),
             receive=self._list(bus, "bus.", "receive", self._name),
             send=self._list(bus, "bus.", "send", self._name),
-            trace=self._trace(self._get(data, "", "trace", dict)),
+            trace=self._trace(data),
         )
 
     def _hash(self, data: dict[str, Any]) -> str:
@@ -147,6 +145,7 @@ class _Reader:
     def _nodes(self, items: list[Any]) -> tuple[Node, ...]:
         if not items:
             raise self.error("tree.nodes", "is empty")
+        self._node_count = len(items)
         nodes: list[Node] = []
         open_nodes: list[Node] = []  # the ancestors of the node at hand
         for index, item in enumerate(items):
@@ -180,13 +179,79 @@ class _Reader:
             raise self.error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
         return node
 
-    def _trace(self, data: dict[str, Any]) -> dict[str, int]:
-        if "CanopyTick" not in data:
-            raise self.error("trace", "has no CanopyTick: the DBC has no trace messages, so nothing can be watched")
-        trace = {name: self._number(data, "trace.", name, 0, ID_MAX) for name in TRACE_MESSAGES if name in data}
-        if len(set(trace.values())) != len(trace):
-            raise self.error("trace", "gives two messages the same id")
-        return trace
+    @staticmethod
+    def _way_out(number: int) -> str:
+        if number > FORMAT:
+            return "use the release of Canopy that the application was built with"
+        return (
+            "build the application again; a log that an older release has recorded is replayed by that release, with "
+            "the program and the model file of then"
+        )
+
+    def _trace(self, data: dict[str, Any]) -> Trace:
+        if "trace" in data and data["trace"] is None:
+            raise self.error(
+                "trace",
+                "is null: the application was built without a trace, so nothing can be watched; build it with "
+                "TRACE 0x600 (canopy_add_application) or --trace 0x600 (canopy compile)",
+            )
+        trace, where = self._get(data, "", "trace", dict), "trace."
+        version = self._get(trace, where, "version", int)
+        if version != VERSION:
+            way_out = "use the release of Canopy that the application was built with"
+            raise self.error("trace.version", f"is {version}, these tools read {VERSION}: {way_out}")
+        extended = self._get(trace, where, "extended", bool)
+        guard = None if trace.get("guard") is None else self._number(trace, where, "guard", 0, DATA_ID_MAX)
+        values = self._list(trace, where, "values", self._value)
+        first = 0
+        for index, value in enumerate(values):
+            if value.slot != first:
+                raise self.error(f"trace.values[{index}].slot", f"is {value.slot}, must be {first}")
+            first += value.slots
+        if first > SLOTS_MAX:
+            raise self.error("trace.values", f"take {first} slots, must be {SLOTS_MAX} at most")
+        return Trace(
+            base=self._number(trace, where, "base", 0, (2**29 if extended else 2**11) - len(MESSAGES)),
+            extended=extended,
+            guard=guard,
+            changes_max=self._number(trace, where, "changes_max", 1, CHANGES_MAX),
+            known_within_ms=self._number(trace, where, "known_within_ms", 0, KNOWN_MS_MAX),
+            values=values,
+            texts=self._list(trace, where, "texts", self._name),
+        )
+
+    def _value(self, item: Any, place: str) -> TraceValue:
+        data = self._object(item, place)
+        place += "."
+        kind, type_name = self._get(data, place, "kind", str), self._get(data, place, "type", str)
+        if kind not in ("entry", "reason"):
+            raise self.error(f"{place}kind", f"is '{kind}', must be entry or reason")
+        if type_name not in TYPES:
+            raise self.error(f"{place}type", f"is '{type_name}', must be one of {', '.join(TYPES)}")
+        if self._get(data, place, "slots", int) != TYPES[type_name]:
+            raise self.error(f"{place}slots", f"is {data['slots']}, must be {TYPES[type_name]} for {type_name}")
+        node = self._number(data, place, "node", 0, self._node_count - 1) if kind == "reason" else None
+        words = self._get(data, place, "enum", dict) if data.get("enum") is not None else {}
+        return TraceValue(
+            kind=kind,
+            name=self._get(data, place, "name", str),
+            path=self._get(data, place, "path", str) if kind == "entry" or "path" in data else "",
+            node=node,
+            type=type_name,
+            slot=self._number(data, place, "slot", 0, SLOTS_MAX - 1),
+            scale=self._scale(data, place),
+            unit=self._get(data, place, "unit", str) if "unit" in data else "ms" if type_name == "duration" else "",
+            words={self._number(words, f"{place}enum.", name, -(2**63), 2**64 - 1): name for name in words},
+        )
+
+    def _scale(self, data: dict[str, Any], place: str) -> Fraction:
+        if data.get("scale") is None:
+            return Fraction(1)
+        text = self._get(data, place, "scale", str)
+        number = re.fullmatch(r"\d{1,19}([.]\d{1,19}|/[1-9]\d{0,18})?", text)
+        if number is None or not Fraction(text):
+            raise self.error(f"{place}scale", f"is '{text[:50]}', must be a number such as 0.01 or 1/3")
+        return Fraction(text)
 
     def _name(self, value: Any, place: str) -> str:
         if not isinstance(value, str):

@@ -20,7 +20,6 @@ from canopy.escape.terminal import Styled, echo
 from canopy.model import Model, ModelError, load_model
 from canopy.process.say import Voice
 from canopy.process.status import DONE, FAILED, NOTHING
-from canopy.replay.log import NEEDED
 from canopy.stop import StopFlag
 from canopy.trace import TraceDecoder, TreeView
 
@@ -98,12 +97,6 @@ class Recorder:
         self._claim: str | None = None
         if model is not None:
             self.summary.ticks = self.summary.trace_lost = self.summary.starts = self.summary.disagreements = 0
-            missing = [name for name in NEEDED if name not in model.trace]
-            if missing:
-                self._tell(
-                    f"{model.path}: trace: has no {' and no '.join(missing)}: the log cannot be replayed; add them to "
-                    "the DBC as in docs/trace.md, and build again"
-                )
 
     def take(self, message: can.Message) -> None:
         """Writes one frame."""

@@ -75,8 +75,7 @@ class SignalTable:
                 message = database.get_message_by_name(name)
             except KeyError:
                 raise ModelError(f"{model.path}: bus: {model.dbc.name} has no message {name}") from None
-            if name not in model.trace:
-                self._watched[message.frame_id] = _watch(message, name in model.send)
+            self._watched[message.frame_id] = _watch(message, name in model.send)
 
     def feed(self, identifier: int, data: bytes, now: float) -> bool:
         """Takes one data frame that was seen at `now` [s]; True when it was a message of the table."""

@@ -4,99 +4,34 @@
 Pure: no clock, no bus. Any bytes may be fed; what is no trace frame of this model is refused, counted, and changes
 nothing else.
 
-A status is shown only when it is certain. After a lost frame every status that was received before is unknown, until a
-Change or a Snapshot brings it again: a tree of up to ten nodes is known again in the next tick. One thing no receiver
-can see: when more nodes change in a tick than the controller may trace, the rest arrive with the next ticks.
+What is shown as certain is so. After a lost frame every code that was received before is unknown, until a CanopyChange
+or a CanopySnapshot brings it again; and where the controller says that it could not tell all, what it has not told is
+not certain.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import IntEnum
+from collections.abc import Callable
+from dataclasses import dataclass
 
+from canopy.live.codes import NO_CODE, NOTHING_KNOWN, UNKNOWN, NodeState, Status
+from canopy.live.frames import SNAPSHOT_NODES, ArrivalsFrame, ChangeFrame, SnapshotFrame, TickFrame, ValueFrame
+from canopy.live.health import CAN_STATES, BusState, Health, read_bus_state, read_health
+from canopy.live.tick import OpenTick
+from canopy.live.trace_model import VERSION
+from canopy.live.values import Slots, ValueState
 from canopy.model import Model
+from canopy.replay import e2e
 
+__all__ = ["CAN_STATES", "BusState", "Health", "NodeState", "Status", "TraceDecoder", "TreeView", "ValueState"]
 
-class Status(IntEnum):
-    """Status codes of a trace. PREVIOUSLY + s: the node is IDLE now, its parent has reset it, and it was s before."""
-
-    UNKNOWN = -1
-    IDLE = 0
-    RUNNING = 1
-    SUCCESS = 2
-    FAILURE = 3
-    SKIPPED = 4
-    PREVIOUSLY = 8
-
-
-_NO_STATUS = 15
-_NO_NODE = 0xFFFF
-_SNAPSHOT_NODES = 10
 _FRAME_BYTES = 8
-_NODE_CODES = frozenset({0, 1, 2, 3, 4, 8, 9, 10, 11, 12})
-_ROOT_CODES = frozenset({0, 1, 2, 3, 4})
-_BACK = 1 << 31  # a tick number that seems to have advanced by more has gone back
+_SEQUENCES = 64
 _TICKS = 1 << 32
+_MORE_AGES = 3
+_HEALTH_OVERRUNS_MAX = 0xFFFF
 
-
-def status_name(code: int) -> str:
-    """E.g. "RUNNING", "IDLE (was RUNNING)", "unknown"."""
-    if code == Status.UNKNOWN:
-        return "unknown"
-    if code > Status.PREVIOUSLY:
-        return f"IDLE (was {Status(code - Status.PREVIOUSLY).name})"
-    return Status(code).name
-
-
-def _plain(code: int) -> int:
-    """IDLE that was IDLE before is just IDLE."""
-    return int(Status.IDLE) if code == Status.PREVIOUSLY else code
-
-
-_FILTERED = 0xFFFF
-
-
-@dataclass(frozen=True)
-class Health:
-    """The controller's loss counters since its start; each stops at 65535."""
-
-    rx_rejected: int = 0
-    rx_unknown: int = 0
-    """65535 also where the driver's filter hands over no unknown frames."""
-    tx_dropped: int = 0
-    """Commands that were replaced or expired before they left, and trace frames that found no room."""
-    faults: int = 0
-
-    @property
-    def unknown(self) -> int | None:
-        """Frames of no message of the controller; None: they are filtered, or too many to count."""
-        return self.rx_unknown if self.rx_unknown != _FILTERED else None
-
-
-CAN_STATES = ("error-active", "error-warning", "error-passive", "blocked", "bus-off", "down", "gone")
-"""The state of the bus by its number in CanopyArrivals (runtime/include/canopy/can_state.h)."""
-
-
-@dataclass(frozen=True)
-class BusState:
-    """What the controller said last of its bus."""
-
-    can_state: int
-    """Index of CAN_STATES."""
-    overload: bool
-    """Frames come faster than they are taken, or were lost: what the tree sees may not be all."""
-    returning: bool
-    """Safe values go out instead of the tree's, until the bus has shown that it works again."""
-
-    @property
-    def is_good(self) -> bool:
-        """As it should be."""
-        return not (self.can_state or self.overload or self.returning)
-
-    def text(self) -> str:
-        """For people, e.g. "blocked, overload"."""
-        more = [*["overload"][: self.overload], *["sends safe values"][: self.returning]]
-        return ", ".join([CAN_STATES[self.can_state], *more])
+Views = tuple["TreeView", ...]
 
 
 @dataclass(frozen=True)
@@ -105,13 +40,14 @@ class TreeView:
 
     tick: int
     """Ticks since the controller's start; does not wrap."""
-    root_status: int
-    statuses: tuple[int, ...]
-    """For each node a Status, or Status.PREVIOUSLY + one; Status.UNKNOWN where it is not certain."""
+    root_status: Status
+    nodes: tuple[NodeState, ...]
+    values: tuple[ValueState, ...]
+    """In the order of the model's."""
     complete: bool
-    """All frames of this tick have been received."""
+    """All frames that this tick has announced have been received."""
     overruns: int
-    """Ticks that took too long since the controller's start: at least so many, exact when joined within 256 of them."""
+    """Ticks that took too long since the controller's start: at least so many."""
     lost: int
     """Trace frames that never arrived, since the decoder's start: at least so many."""
     ticks_missed: int
@@ -119,16 +55,26 @@ class TreeView:
     restarts: int
     """How often the controller was seen to start anew."""
     refused: int
-    """Frames with a trace id that were no trace frames of this model."""
-    health: Health | None
-    """None until the first CanopyHealth."""
+    """Frames with a trace id that were no trace frames of this model, those with a wrong CRC too."""
+    crc_errors: int
+    """Of these: CanopyTick frames with a wrong CRC. Only where they are guarded."""
+    health: Health
     bus: BusState | None
-    """None until the first CanopyArrivals."""
+    """None until the first CanopyInputs."""
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """What each node is; UNKNOWN where that is not certain."""
+        return tuple(node.status for node in self.nodes)
 
 
 def mismatch(model: Model, data: bytes) -> str | None:
     """Compares a model with a CanopyModel frame's 8 bytes: None when they agree, else what is wrong and the way out."""
-    digits, nodes = f"{int.from_bytes(data[:4], 'little'):08x}", int.from_bytes(data[4:6], "little")
+    if data[0] >> 4 != VERSION:
+        return other_version(model, data[0] >> 4)
+    if data[0] & 0x0F:
+        return None  # the page of the time
+    digits, nodes = f"{int.from_bytes(data[1:5], 'little'):08x}", int.from_bytes(data[5:7], "little")
     if (digits, nodes) == (model.hash[:8], len(model.nodes)):
         return None
     return (
@@ -138,49 +84,57 @@ def mismatch(model: Model, data: bytes) -> str | None:
     )
 
 
-@dataclass
-class _Tick:
-    """The tick whose frames are arriving."""
-
-    number: int
-    root_status: int
-    changes_left: int
-    has_snapshot: bool
-    intact: bool = True
-
-    @property
-    def frames_left(self) -> int:
-        """How many frames of the tick are still to come."""
-        return (self.changes_left + 1) // 2 + self.has_snapshot
+def other_version(model: Model, version: int) -> str:
+    """What to say of a trace of another version."""
+    return (
+        f"{model.path}: the frames with the id 0x{model.trace.base:X} are no CanopyTick of trace version {VERSION}, "
+        f"but of version {version}, or of an older one without a number, or somebody else's; use the release of Canopy "
+        "that the firmware was built with"
+    )
 
 
-@dataclass
 class TraceDecoder:
     """Feed it the bus's data frames in their order; it gives a TreeView for each tick."""
 
-    model: Model
-    tree: int = 0
-    lost: int = 0
-    ticks_missed: int = 0
-    restarts: int = 0
-    refused: int = 0
-    health: Health | None = None
-    bus: BusState | None = None
-    mismatch: str | None = None
-    """Why the model is not that of the controller which the last CanopyModel came from; None while they agree."""
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.lost = 0
+        self.ticks_missed = 0
+        self.restarts = 0
+        self.refused = 0
+        self.crc_errors = 0
+        self.health = Health()
+        self.bus: BusState | None = None
+        self.mismatch: str | None = None
+        """Why nothing can be told of this controller with this model: another tree, another version; None: it can."""
+        self._codes = [UNKNOWN] * len(model.nodes)
+        """Told last."""
+        self._states = (NOTHING_KNOWN,) * len(model.nodes)
+        self._settled = True
+        """Of the last tick every known code was certain, and none has changed since."""
+        self._slots = Slots(model.trace)
+        self._tick: OpenTick | None = None
+        self._newest: OpenTick | None = None
+        """The tick at hand, or one that is over without a stray frame."""
+        self._last_tick: int | None = None
+        self._sequence: int | None = None
+        self._gap = 0  # lost frames since the last CanopyTick; counted when the next one shows that this was no restart
+        self._overruns = 0
+        self._takers: dict[int, Callable[[bytes], Views]] = {
+            model.trace.ids[name]: taker
+            for name, taker in (
+                ("CanopyTick", self._take_tick),
+                ("CanopyInputs", self._take_inputs),
+                ("CanopyArrivals", self._take_arrivals),
+                ("CanopySnapshot", self._take_snapshot),
+                ("CanopyChange", self._take_change),
+                ("CanopyValue", self._take_value),
+                ("CanopyHealth", self._take_health),
+                ("CanopyModel", self._take_model),
+            )
+        }
 
-    _statuses: list[int] = field(init=False)
-    _sequence: int | None = None
-    _gap: int = 0  # lost frames since the last CanopyTick; counted when the next one shows that this was no restart
-    _tick: _Tick | None = None
-    _last_tick: int | None = None
-    _overruns: int = 0
-
-    def __post_init__(self) -> None:
-        self._statuses = [int(Status.UNKNOWN)] * len(self.model.nodes)
-        self._names = {identifier: name for name, identifier in self.model.trace.items()}
-
-    def feed(self, identifier: int, data: bytes) -> tuple[TreeView, ...]:
+    def feed(self, identifier: int, data: bytes) -> Views:
         """Takes one data frame.
 
         Args:
@@ -191,157 +145,235 @@ class TraceDecoder:
             The views of the ticks that this frame completes: none, one, or two when a tick without further frames
             follows on one that stayed incomplete.
         """
-        name = self._names.get(identifier)
-        if name is None:
+        taker = self._takers.get(identifier)
+        if taker is None:
             return ()
         if len(data) != _FRAME_BYTES:
-            self.refused += 1
-            return ()
-        if name == "CanopyTick":
-            return self._take_tick(data)
-        if name == "CanopyChange":
-            return self._take_change(data)
-        if name == "CanopySnapshot":
-            return self._take_snapshot(data)
-        if name == "CanopyHealth":
-            self.health = Health(*(int.from_bytes(data[place : place + 2], "little") for place in (0, 2, 4, 6)))
-        elif name == "CanopyModel":
-            self.mismatch = mismatch(self.model, data)
-        elif name == "CanopyArrivals":
-            self._take_arrivals(data)
-        return ()  # CanopyInputs is for replays
-
-    def flush(self) -> tuple[TreeView, ...]:
-        """Gives up waiting for the rest of the tick at hand; call it when the bus has been silent for some periods."""
+            return self._refuse()
+        refused, tick = self.refused, self._tick
+        views = taker(data)
         if self._tick is None:
-            return ()
-        self._tick.intact = False
-        if self._tick.changes_left:
-            self._forget()
+            return views
+        self._tick.is_followed |= self._tick is tick and self.refused == refused
+        return views + self._finish() if self._tick.is_over else views
+
+    def flush(self) -> Views:
+        """Gives up waiting for the rest of the tick at hand; call it when the bus has been silent for some periods."""
         return self._finish()
 
-    def _take_tick(self, data: bytes) -> tuple[TreeView, ...]:
-        number = int.from_bytes(data[1:5], "little")
-        root_status, tree = data[5] & 15, data[5] >> 4
-        if root_status not in _ROOT_CODES:
-            self.refused += 1
-            return ()
-        if tree != self.tree:
-            return ()
-        advance = (number - (self._last_tick or 0)) % _TICKS
-        if self._last_tick is not None and (advance == 0 or advance >= _BACK):
-            views = self.flush()
-            self._restart(number, data)
-        else:
-            self._follow(data[0])
-            self._count_losses(max(0, advance - 1) if self._last_tick is not None else 0)
-            views = self.flush()
-            self._overruns = data[7] if self._last_tick is None else self._overruns + (data[7] - self._overruns) % 256
-            self._last_tick = number if self._last_tick is None else self._last_tick + advance
-        self._gap = 0
-        self._tick = _Tick(self._last_tick, root_status, data[6], "CanopySnapshot" in self.model.trace)
-        return views + self._finish_when_all_is_there()
-
-    def _take_change(self, data: bytes) -> tuple[TreeView, ...]:
-        nodes = [(int.from_bytes(data[1:3], "little"), data[5] & 15)]
-        second = (int.from_bytes(data[3:5], "little"), data[5] >> 4)
-        if second != (_NO_NODE, _NO_STATUS):
-            nodes.append(second)
-        if not all(node < len(self._statuses) and code in _NODE_CODES for node, code in nodes):
-            self.refused += 1
-            return ()
-        if data[6] & 15 != self.tree:
-            return ()
-        views = self._follow_in_tick(data[0])
-        for node, code in nodes:
-            self._statuses[node] = _plain(code)
-        if self._tick is not None:
-            self._tick.changes_left = max(0, self._tick.changes_left - len(nodes))
-        return views + self._finish_when_all_is_there()
-
-    def _take_snapshot(self, data: bytes) -> tuple[TreeView, ...]:
-        first = int.from_bytes(data[1:3], "little")
-        codes = [(byte >> shift) & 15 for byte in data[3:] for shift in (0, 4)]
-        count = min(_SNAPSHOT_NODES, len(self._statuses) - first)
-        if count <= 0 or not _NODE_CODES.issuperset(codes[:count]) or set(codes[count:]) - {_NO_STATUS}:
-            self.refused += 1
-            return ()
-        views = self._follow_in_tick(data[0])
-        self._statuses[first : first + count] = map(_plain, codes[:count])
-        return views + self._finish()  # it is a tick's last frame: what has not come by now does not come
-
-    def _take_arrivals(self, data: bytes) -> None:
-        """The ages are for replays. Bit 7 is not used."""
-        state = data[0] & 7
-        if state >= len(CAN_STATES) or data[0] & 0x80:
-            self.refused += 1
-            return
-        self.bus = BusState(state, bool(data[0] & 0x08), bool(data[0] & 0x40))
-
-    def _follow_in_tick(self, sequence: int) -> tuple[TreeView, ...]:
-        """_follow() for a frame within a tick: the one at hand, or a later one whose CanopyTick was lost.
-
-        The former has only so many frames left. When as many are lost, this frame cannot be one of them.
-        """
-        tick = self._tick
-        missing = self._follow(sequence)
-        if tick is None or missing >= tick.frames_left:
-            return self.flush()
-        # Changes come first in a tick: what is missing before one of its frames were Changes, of two nodes each.
-        tick.changes_left = max(0, tick.changes_left - 2 * missing)
+    def _refuse(self) -> Views:
+        self.refused += 1
         return ()
 
-    def _follow(self, sequence: int) -> int:
-        """Compares the frame's sequence number with the one that was due; returns how many are missing between."""
-        gap = (sequence - self._sequence - 1) % 256 if self._sequence is not None else 0
-        self._sequence = sequence
-        if gap:
-            self._gap += gap
-            self._forget()
-        return gap
+    def _take_tick(self, data: bytes) -> Views:
+        frame = TickFrame.read(data)
+        guard = self.model.trace.guard
+        if guard is not None and e2e.crc(guard, data) != data[0]:
+            self.crc_errors += 1
+            return self._refuse()
+        if frame.version != VERSION:
+            self.mismatch = other_version(self.model, frame.version)
+            return self._refuse()
+        if frame.root_status not in range(Status.RUNNING, Status.SKIPPED + 1):
+            return self._refuse()
+        views = self._finish()
+        goes_on = self._last_tick is not None and self._last_tick % _TICKS == _TICKS - 1
+        if self._last_tick is None:
+            self._last_tick, self._overruns = frame.tick, frame.overruns
+            self._follow(frame.sequence)
+            self.lost += self._gap
+        else:
+            self._advance(self._last_tick, frame)
+        if frame.tick == frame.sequence == 0 and not goes_on:
+            self._know_the_start()
+        self._gap = 0
+        self._slots.begin()
+        self._tick = self._newest = OpenTick(self._last_tick, frame)
+        return views
 
-    def _forget(self) -> None:
-        self._statuses = [int(Status.UNKNOWN)] * len(self._statuses)
-        if self._tick is not None:
-            self._tick.intact = False
+    def _advance(self, last: int, frame: TickFrame) -> None:
+        """From the CanopyTick before to this one: what is missing in between, or that the controller was restarted."""
+        advance = frame.tick - last % _TICKS
+        if advance == 1 - _TICKS:
+            advance = 1  # 0 behind the largest number
+        if advance < 1:
+            self.restarts += 1
+            self.health, self.bus = Health(), None
+            self._last_tick, self._sequence, self._overruns = frame.tick, frame.sequence, frame.overruns
+            self._forget_all()
+            return
+        self._follow(frame.sequence)
+        self._last_tick = last + advance
+        self._overruns += (frame.overruns - self._overruns) % 4
+        # The sequence tells the number of lost frames modulo 64; each missed tick had at least one.
+        self.ticks_missed += advance - 1
+        self.lost += self._gap + _SEQUENCES * -(-max(0, advance - 1 - self._gap) // _SEQUENCES)
+        if advance > 1:
+            self._forget_all()
 
-    def _count_losses(self, ticks_missed: int) -> None:
-        """The sequence tells the number of lost frames modulo 256; each missed tick had at least one."""
-        self.ticks_missed += ticks_missed
-        wraps = -(-max(0, ticks_missed - self._gap) // 256)
-        self.lost += self._gap + 256 * wraps
-        if wraps:
-            self._forget()
+    def _know_the_start(self) -> None:
+        self._codes = [0] * len(self._codes)
+        self._states = (NodeState(0, True, 0, True),) * len(self._codes)
+        self._settled = True
+        self._slots.know()
 
-    def _restart(self, number: int, data: bytes) -> None:
-        """The new run's sequence has nothing to do with the old one's: what is missing between them is not a loss."""
-        self.restarts += 1
-        self.health = None
-        self.bus = None
-        self._last_tick = number
-        self._sequence = data[0]
-        self._overruns = data[7]
-        self._forget()
+    def _take_inputs(self, data: bytes) -> Views:
+        state = read_bus_state(data)
+        if state is None:
+            return self._refuse()
+        if self._tick is None or self._tick.is_followed:
+            return self._take_foreign(None)
+        self.bus = state
+        self._tick.take_inputs(data[5] >> 5 & 3 == _MORE_AGES)
+        return ()
 
-    def _finish_when_all_is_there(self) -> tuple[TreeView, ...]:
-        return self._finish() if self._tick is not None and not self._tick.frames_left else ()
+    def _take_arrivals(self, data: bytes) -> Views:
+        frame = ArrivalsFrame.read(data)
+        if frame is None:
+            return self._refuse()
+        if self._newest is None or not self._newest.may_have(frame):
+            return self._take_foreign(None)
+        self._newest.take_arrivals(frame)
+        return ()
 
-    def _finish(self) -> tuple[TreeView, ...]:
+    def _take_snapshot(self, data: bytes) -> Views:
+        frame = SnapshotFrame.read(data)
+        codes = frame.codes[: len(self._codes) - frame.first] if frame.first < len(self._codes) else ()
+        if not codes or NO_CODE in codes or set(frame.codes[len(codes) :]) - {NO_CODE}:
+            return self._refuse()
         tick = self._tick
+        if tick is None or not tick.expects_snapshot(frame):
+            return self._take_foreign(frame.sequence)
+        self._follow(frame.sequence)
+        tick.take_snapshot()
+        self._tell(tick, range(frame.first, frame.first + SNAPSHOT_NODES), codes)
+        return ()
+
+    def _take_change(self, data: bytes) -> Views:
+        frame = ChangeFrame.read(data)
+        if frame is None or frame.nodes[-1] >= len(self._codes):
+            return self._refuse()
+        tick, missing = self._tick, self._missing(frame.sequence)
+        if tick is None or not tick.expects_change(frame, self.model.trace.changes_max):
+            return self._take_foreign(frame.sequence)
+        if not tick.goes_round(frame):
+            return self._refuse()
+        if missing and tick.last is not None:
+            self._forget_between(tick.last, frame.nodes[0])
+            self._follow(frame.sequence, forget=False)
+        else:
+            self._follow(frame.sequence)
+        tick.take_change(frame, missing)
+        self._tell(tick, frame.nodes, frame.codes)
+        return ()
+
+    def _take_value(self, data: bytes) -> Views:
+        frame = ValueFrame.read(data)
+        if not self._slots.has(frame.slot):
+            return self._refuse()
+        tick = self._tick
+        if tick is None or not tick.expects_value(frame):
+            return self._take_foreign(None)
+        if self._slots.was_told(frame.slot):
+            return self._refuse()
+        tick.take_value()
+        self._slots.take(frame.slot, frame.bits, frame.more)
+        return ()
+
+    def _take_foreign(self, sequence: int | None) -> Views:
+        """A frame of a tick whose CanopyTick was lost. So the one at hand is over."""
+        views = self._finish()
+        self._newest = None
+        if sequence is not None:
+            self._follow(sequence)
+        self._forget_codes()
+        return views
+
+    def _take_health(self, data: bytes) -> Views:
+        health = read_health(data, self.health)
+        if health is None:
+            return self._refuse()
+        self.health = health
+        if health.overruns is not None and health.overruns < _HEALTH_OVERRUNS_MAX:
+            self._overruns = max(self._overruns, health.overruns)
+        return ()
+
+    def _take_model(self, data: bytes) -> Views:
+        if data[0] & 0x0F > 1:
+            return self._refuse()
+        if data[0] >> 4 != VERSION or data[0] & 0x0F == 0:
+            self.mismatch = mismatch(self.model, data)
+        return ()
+
+    def _missing(self, sequence: int) -> int:
+        """How many frames are missing before the one with this number, modulo 64."""
+        return (sequence - self._sequence - 1) % _SEQUENCES if self._sequence is not None else 0
+
+    def _follow(self, sequence: int, forget: bool = True) -> None:
+        missing = self._missing(sequence)
+        self._sequence = sequence
+        self._gap += missing
+        if missing and forget:
+            self._forget_codes()
+
+    def _tell(self, tick: OpenTick, nodes: range | tuple[int, ...], codes: tuple[int, ...]) -> None:
+        for node, code in zip(nodes, codes, strict=False):
+            self._codes[node] = code
+            tick.told.add(node)
+        self._settled = False
+
+    def _forget_codes(self) -> None:
+        self._codes = [UNKNOWN] * len(self._codes)
+        self._settled = False
+
+    def _forget_between(self, last: int, first: int) -> None:
+        """The nodes behind `last` and before `first`, going around."""
+        count = len(self._codes)
+        for step in range(1, (first - last) % count):
+            self._codes[(last + step) % count] = UNKNOWN
+        self._settled = False
+
+    def _forget_all(self) -> None:
+        self._forget_codes()
+        self._states = (NOTHING_KNOWN,) * len(self._codes)
+        self._slots.forget()
+
+    def _finish(self) -> Views:
+        tick, self._tick = self._tick, None
         if tick is None:
             return ()
-        self._tick = None
+        if not (self._settled and tick.tells_all):
+            self._states = tuple(
+                self._state(tick, code, before, node)
+                for node, (code, before) in enumerate(zip(self._codes, self._states, strict=True))
+            )
+            self._settled = tick.tells_all
+        if tick.nodes_left:
+            self._forget_codes()
         view = TreeView(
             tick=tick.number,
-            root_status=tick.root_status,
-            statuses=tuple(self._statuses),
-            complete=tick.intact and not tick.changes_left,
+            root_status=Status(tick.root_status),
+            nodes=self._states,
+            values=self._slots.end(not tick.values_left),
+            complete=tick.is_complete,
             overruns=self._overruns,
             lost=self.lost,
             ticks_missed=self.ticks_missed,
             restarts=self.restarts,
             refused=self.refused,
+            crc_errors=self.crc_errors,
             health=self.health,
             bus=self.bus,
         )
         return (view,)
+
+    @staticmethod
+    def _state(tick: OpenTick, code: int, before: NodeState, node: int) -> NodeState:
+        """Of a node when a tick is over; `before`: when the last one was, with nothing known where one was missed."""
+        if code == UNKNOWN:
+            return NOTHING_KNOWN
+        if not tick.tells(node):
+            return NodeState(code, False, None, False)
+        if not before.certain:
+            return NodeState(code, True, tick.number, False)
+        return before if before.code == code else NodeState(code, True, tick.number, True)

@@ -17,8 +17,10 @@ from rich.tree import Tree
 
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo, styled
+from canopy.live.codes import NOTHING_KNOWN, NodeState, last_result, was_ticked
+from canopy.live.words import health_words
 from canopy.model import Node
-from canopy.trace import Status, TreeView, status_name
+from canopy.trace import Status, TreeView
 from canopy.watch import Watch
 
 _STYLES = {
@@ -31,6 +33,7 @@ _STYLES = {
 }
 _SYMBOLS = {"Sequence": ("→", "->"), "Fallback": ("?", "?"), "Parallel": ("⇉", "=>")}
 _LEAF_NAMES_IN_A_LINE = 6
+_VALUES_IN_A_LINE = 6
 _REDRAW_S = 0.1
 
 
@@ -48,9 +51,9 @@ def line(watch: Watch, now: float) -> str:
     if view is None:
         return f"{watch.model.application}: no trace yet"
     active = [
-        f"{node.name} {status_name(code)}"
-        for node, code in zip(watch.model.nodes, view.statuses, strict=True)
-        if node.category in ("condition", "action") and code != Status.IDLE and code <= Status.SKIPPED
+        f"{node.name} {state.text}"
+        for node, state in zip(watch.model.nodes, view.nodes, strict=True)
+        if node.category in ("condition", "action") and state.status not in (Status.IDLE, Status.UNKNOWN)
     ]
     more = f", {len(active) - _LEAF_NAMES_IN_A_LINE} more" if len(active) > _LEAF_NAMES_IN_A_LINE else ""
     readings = watch.signals.readings(now)
@@ -62,20 +65,25 @@ def line(watch: Watch, now: float) -> str:
     )
     leaves = ", ".join(active[:_LEAF_NAMES_IN_A_LINE]) + more
     return (
-        f"tick {view.tick} {status_name(view.root_status)} [{leaves}] {signals}; {_pace(watch, now)}{_bus(view)}; "
-        f"{_losses(view)}{'; THE CONTROLLER CLAIMS ANOTHER TREE' if watch.disagreement else ''}"
+        f"tick {view.tick} {view.root_status.name} [{leaves}] {signals}{_values(view)}; "
+        f"{_pace(watch, now)}{_bus(view)}; {_losses(view)}"
+        f"{'; THE CONTROLLER CLAIMS ANOTHER TREE' if watch.disagreement else ''}"
     )
 
 
 def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> RenderableType:
     """The controller as a picture for a terminal: tree, signals, one line on its health."""
     silent = watch.silent_for(now) is not None
+    view = watch.view
     table = Table.grid(padding=(0, 1), expand=True)
     table.add_column(ratio=1)
     table.add_column(ratio=1)
     table.add_row(
         Panel(_tree(watch, silent, ascii_only), title=styled(watch.model.tree_id), title_align="left"),
-        Panel(_signals(watch, now), title="signals", title_align="left"),
+        Group(
+            Panel(_signals(watch, now), title="signals", title_align="left"),
+            *([Panel(_value_table(view), title="values", title_align="left")] if view and view.values else []),
+        ),
     )
     claim = [styled(watch.disagreement, style="bold red")] if watch.disagreement else []
     return Group(styled(title, style="bold"), table, *claim, _footer(watch, now))
@@ -83,18 +91,18 @@ def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> R
 
 def _tree(watch: Watch, silent: bool, ascii_only: bool) -> Tree:
     view = watch.view
-    statuses = view.statuses if view else (int(Status.UNKNOWN),) * len(watch.model.nodes)
+    states = view.nodes if view else (NOTHING_KNOWN,) * len(watch.model.nodes)
     branches: list[Tree] = []
     for node in watch.model.nodes:
-        label = _label(node, statuses[node.index], silent, ascii_only)
+        label = _label(node, states[node.index], silent, ascii_only)
         branches.append(Tree(label) if node.parent is None else branches[node.parent].add(label))
     return branches[0]
 
 
-def _label(node: Node, code: int, silent: bool, ascii_only: bool) -> Text:
-    before = code > Status.PREVIOUSLY
-    shown = Status(code - Status.PREVIOUSLY) if before else Status(code)
-    style = _STYLES[Status.UNKNOWN] if silent else _STYLES[shown].replace("bold", "dim" if before else "bold")
+def _label(node: Node, state: NodeState, silent: bool, ascii_only: bool) -> Text:
+    style = _STYLES[last_result(state.code)] if state.certain and not silent else _STYLES[Status.UNKNOWN]
+    if not was_ticked(state.code):
+        style = style.replace("bold", "dim")
     if node.category == "control":
         head = f"{symbol(node, ascii_only)}  {node.name}"
     elif node.category == "condition":
@@ -103,7 +111,14 @@ def _label(node: Node, code: int, silent: bool, ascii_only: bool) -> Text:
         head = f"[{node.name}]"
     else:
         head = f"<{node.type}> {node.name}"
-    return styled((head, style), "  ", (f"was {shown.name}" if before else shown.name, style))
+    return styled((head, style), "  ", (state.text + _since(state), style))
+
+
+def _since(state: NodeState) -> str:
+    """Of a node that was not ticked: since when it is so."""
+    if not state.certain or state.code <= 0 or was_ticked(state.code):
+        return ""
+    return f" since tick {state.since}{'' if state.exact else ' or before'}"
 
 
 def _signals(watch: Watch, now: float) -> Table:
@@ -121,6 +136,20 @@ def _signals(watch: Watch, now: float) -> Table:
     return table
 
 
+def _value_table(view: TreeView) -> Table:
+    table = Table.grid(padding=(0, 1))
+    for state in view.values:
+        table.add_row(styled(state.value.title), styled(state.text, style="cyan" if state.certain else "bright_black"))
+    return table
+
+
+def _values(view: TreeView) -> str:
+    """What has been told, for a line."""
+    told = [f"{state.value.title} {state.text}" for state in view.values if state.known is not None]
+    more = f", {len(told) - _VALUES_IN_A_LINE} more" if len(told) > _VALUES_IN_A_LINE else ""
+    return f"; {', '.join(told[:_VALUES_IN_A_LINE])}{more}" if told else ""
+
+
 def _footer(watch: Watch, now: float) -> Text:
     view = watch.view
     if view is None:
@@ -128,7 +157,7 @@ def _footer(watch: Watch, now: float) -> Text:
     lossless = not (view.lost or view.refused)
     return styled(
         (f"tick {view.tick}  ", "bold"),
-        (f"{status_name(view.root_status)}  ", _STYLES[Status(view.root_status)]),
+        (f"{view.root_status.name}  ", _STYLES[view.root_status]),
         (_pace(watch, now), "bold red" if watch.silent_for(now) is not None else ""),
         (_bus(view), "bold red"),
         "; ",
@@ -145,16 +174,12 @@ def _losses(view: TreeView) -> str:
     text = f"{view.overruns} overruns, {view.lost} trace frames lost"
     if view.refused:
         text += f", {view.refused} refused"
+    if view.crc_errors:
+        text += f" ({view.crc_errors} of them CanopyTick with a wrong CRC)"
     if view.restarts:
         text += f", {view.restarts} restarts"
-    if view.health is not None:
-        health = view.health
-        unknown = "unknown filtered" if health.unknown is None else f"{health.unknown} unknown"
-        text += (
-            f"; controller: {health.rx_rejected} refused, {unknown}, {health.tx_dropped} not sent, "
-            f"{health.faults} faults"
-        )
-    return text
+    health = health_words(view.health)
+    return text + (f"; controller: {health}" if health else "")
 
 
 def _bus(view: TreeView) -> str:

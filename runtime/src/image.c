@@ -278,9 +278,8 @@ static canopy_error_t exchange(const canopy_image_app_t *self, canopy_loop_t *lo
     self->state->running = slot;
     (void)canopy_tree_init(app->tree_instance, tree, app->status, app->words, app->memory);
     app->tree_instance->faults = faults;
-    app->trace_state->next_node = 0;
-    for (uint16_t node = 0; node < tree->node_count; node++) {
-        app->sent[node] = (uint8_t)CANOPY_IDLE;
+    if (app->trace != NULL) {
+        canopy_trace_follow_exchange(app->trace_state);
     }
     return error;
 }

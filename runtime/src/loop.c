@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "trace_parts.h"
+
 enum { LATENESS_FIRST_US = 16 };
 
 static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t detail)
@@ -13,14 +15,20 @@ static void report(const canopy_loop_t *self, canopy_fault_t fault, uint32_t det
     }
 }
 
+static bool has_memory_for_trace(const canopy_app_t *app)
+{
+    return app->trace == NULL ||
+           (app->trace_state != NULL && app->sent != NULL && app->nodes_max >= app->tree->node_count &&
+            (app->told != NULL || app->trace->value_count == 0u));
+}
+
 static bool is_complete(const canopy_loop_config_t *config)
 {
     const canopy_app_t *app = config->app;
 
     return app != NULL && config->can != NULL && config->clock != NULL && app->period > 0u && app->bus != NULL &&
-           app->trace != NULL && app->bus_state != NULL && app->input != NULL && app->output != NULL &&
-           (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->trace_state != NULL &&
-           app->sent != NULL && app->rx_max > 0u && app->frame_us > 0u;
+           app->bus_state != NULL && app->input != NULL && app->output != NULL &&
+           (app->rx != NULL || app->bus->rx_count == 0u) && app->tx != NULL && app->rx_max > 0u && app->frame_us > 0u;
 }
 
 static void start_bus(const canopy_app_t *app)
@@ -28,14 +36,6 @@ static void start_bus(const canopy_app_t *app)
     *app->bus_state = (canopy_bus_state_t){.bus = app->bus, .input = app->input, .output = app->output, .rx = app->rx};
     for (uint16_t index = 0; index < app->bus->rx_count; index++) {
         app->rx[index] = (canopy_rx_state_t){0};
-    }
-}
-
-static void start_trace(const canopy_app_t *app)
-{
-    *app->trace_state = (canopy_trace_state_t){.sent = app->sent};
-    for (uint16_t node = 0; node < app->tree->node_count; node++) {
-        app->sent[node] = (uint8_t)CANOPY_IDLE;
     }
 }
 
@@ -49,6 +49,9 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
     }
     app = config->app;
     error = canopy_tree_init(app->tree_instance, app->tree, app->status, app->words, app->memory);
+    if (error == CANOPY_OK && !has_memory_for_trace(app)) {
+        error = CANOPY_ERROR_ARGUMENT;
+    }
     if (error == CANOPY_OK) {
         error = canopy_tx_init(app->tx, app->bus->tx, app->bus->tx_count, &app->tx_memory, config->can);
     }
@@ -56,7 +59,11 @@ canopy_error_t canopy_loop_init(canopy_loop_t *self, const canopy_loop_config_t 
         return error;
     }
     start_bus(app);
-    start_trace(app);
+    if (app->trace != NULL) {
+        app->trace_state->sent = app->sent;
+        app->trace_state->told = app->told;
+        canopy_trace_start(app->trace, app->trace_state, app->nodes_max);
+    }
     if (app->start != NULL) {
         app->start(app->memory);
     }
@@ -198,6 +205,7 @@ static void write_outputs(canopy_loop_t *self, canopy_time_t now)
 static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_status_t root)
 {
     const canopy_app_t *app = self->config->app;
+    canopy_time_t until = cycle->now + CANOPY_TRACE_PERIODS * app->period;
 
     canopy_trace_send(app->trace, app->trace_state, app->tree_instance, app->tx,
                       &(canopy_trace_tick_t){.tick = self->ticks,
@@ -206,8 +214,8 @@ static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_
                                              .cycle = cycle,
                                              .bus = app->bus_state,
                                              .returning = self->returning,
-                                             .until = cycle->now + CANOPY_TRACE_PERIODS * app->period,
-                                             .is_filtered = self->config->can->is_filtered});
+                                             .until = until});
+    canopy_trace_health(self, until);
 }
 
 canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
@@ -220,7 +228,9 @@ canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
     canopy_bus_begin_tick(app->bus_state, &cycle);
     root = canopy_tree_tick(app->tree_instance, now);
     write_outputs(self, now);
-    send_trace(self, &cycle, root);
+    if (app->trace != NULL) {
+        send_trace(self, &cycle, root);
+    }
     canopy_tx_kick(app->tx, now);
     self->ticks++;
     if (app->tree_instance->faults != faults) {

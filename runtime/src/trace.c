@@ -1,220 +1,211 @@
 /* SPDX-License-Identifier: MIT */
-/** @file The trace of a tick as CAN frames. Layout: docs/trace.md, and the Canopy... messages of the DBC. */
+/** @file A tick as CAN frames: CanopyTick, CanopyInputs, CanopyArrivals, CanopyModel; nodes and values are elsewhere. */
 #include "canopy/trace.h"
 
 #include <stddef.h>
 
-enum { SNAPSHOT_NODES = 10, NO_NODE = 0xFFFF, NO_STATUS = 15, ARRIVALS = 3, FILTERED = 0xFFFF };
-enum { OVERLOAD_BIT = 8, RETURNING_BIT = 0x40 }; /* of CanopyArrivals' first byte */
+#include "canopy/e2e.h"
+#include "trace_parts.h"
 
-static void put16(uint8_t *data, uint32_t value)
+enum { HAS_SNAPSHOT = 0x40, HAS_CHANGES = 0x80 };            /* of CanopyTick's byte 6 */
+enum { OVERLOAD = 0x08, RETURNING = 0x10, MANY = 0x80 };     /* of CanopyInputs' byte 5 */
+enum { AGES_AT = 5, AGES_IN_INPUTS = 2, AGES_AND_MORE = 3 }; /* bits 5 and 6 there */
+enum { ANNOUNCEMENTS = 3 };                                  /* of another tree: in so many ticks */
+enum { AGES_IN_FRAME = 7, LAST = 0x80, LONG_AGE = 255, MANY_FRAMES = 256 };
+
+static void send_tick(const canopy_trace_sink_t *sink, const canopy_trace_tick_t *tick, unsigned flags, uint8_t values)
 {
-    data[0] = (uint8_t)(value & 0xFFu);
-    data[1] = (uint8_t)((value >> 8) & 0xFFu);
-}
+    const canopy_trace_config_t *config = sink->config;
+    canopy_trace_state_t *state = sink->state;
+    canopy_tx_trace_data_t data = {{0, CANOPY_TRACE_VERSION << 4}};
+    unsigned number = canopy_trace_number(state);
 
-static uint32_t at_most16(uint32_t value)
-{
-    return value < UINT16_MAX ? value : UINT16_MAX;
-}
-
-/** Where the frames of a tick go. */
-typedef struct {
-    canopy_tx_t *tx;
-    canopy_time_t until;
-} sink_t;
-
-static void send(const sink_t *sink, canopy_trace_id_t id, const canopy_tx_trace_data_t *data)
-{
-    canopy_tx_trace(sink->tx, id.id, id.flags, data, sink->until);
-}
-
-/** How many nodes' statuses differ from what was sent, counted up to `most`. */
-static uint32_t count_changes(const canopy_trace_state_t *self, const canopy_tree_instance_t *tree, uint32_t most)
-{
-    uint32_t changes = 0;
-
-    for (uint16_t node = 0; node < tree->tree->node_count && changes < most; node++) {
-        changes += self->sent[node] != tree->status[node] ? 1u : 0u;
+    if (tick->tick == 0u && number == 0u && state->has_begun) {
+        number = canopy_trace_number(state); /* 0 and 0 together is the start, not tick 2^32 */
     }
-    return changes;
+    state->has_begun = true;
+    canopy_trace_put16(&data.byte[2], tick->tick);
+    canopy_trace_put16(&data.byte[4], tick->tick >> 16);
+    data.byte[6] = (uint8_t)(number | flags);
+    data.byte[7] = (uint8_t)((unsigned)tick->root | ((unsigned)values << 3) | ((tick->overruns & 3u) << 6));
+    if (config->data_id != CANOPY_E2E_NONE) {
+        canopy_e2e_protect((uint16_t)config->data_id, state->counter, data.byte, CANOPY_TX_TRACE_LENGTH);
+        state->counter = state->counter + 1u < CANOPY_E2E_COUNTERS ? (uint8_t)(state->counter + 1u) : 0u;
+    }
+    canopy_trace_post(sink, CANOPY_TRACE_TICK, &data);
 }
 
-static void send_tick(const canopy_trace_config_t *config, canopy_trace_state_t *self, const sink_t *sink,
-                      const canopy_trace_tick_t *tick, uint32_t changes)
-{
-    canopy_tx_trace_data_t data = {{self->sequence}};
-
-    put16(&data.byte[1], tick->tick);
-    put16(&data.byte[3], tick->tick >> 16);
-    data.byte[5] = (uint8_t)((unsigned)tick->root | ((unsigned)config->tree << 4));
-    data.byte[6] = (uint8_t)changes;
-    data.byte[7] = (uint8_t)(tick->overruns & 0xFFu);
-    self->sequence++;
-    send(sink, config->tick, &data);
-}
-
-/** What the tick worked with. Without a sequence number: there is one after each CanopyTick. */
-static void send_inputs(const canopy_trace_config_t *config, const sink_t *sink, const canopy_trace_tick_t *tick)
-{
-    canopy_time_t now = tick->cycle->now;
+/** The list of ages: first in CanopyInputs, then in CanopyArrivals. */
+typedef struct {
+    const canopy_trace_sink_t *sink;
     canopy_tx_trace_data_t data;
+    uint8_t filled;
+    bool in_inputs;
+} ages_t;
 
-    put16(&data.byte[0], (uint32_t)(now & 0xFFFFu));
-    put16(&data.byte[2], (uint32_t)((now >> 16) & 0xFFFFu));
-    put16(&data.byte[4], (uint32_t)((now >> 32) & 0xFFFFu));
-    data.byte[6] = tick->bus->taken;
-    data.byte[7] = tick->bus->check;
-    send(sink, config->inputs, &data);
+static void end_arrivals(ages_t *self, unsigned last)
+{
+    self->data.byte[0] = (uint8_t)((self->sink->tick & 15u) | ((unsigned)self->filled << 4) | last);
+    for (unsigned byte = 1u + self->filled; byte < (unsigned)CANOPY_TX_TRACE_LENGTH; byte++) {
+        self->data.byte[byte] = 0;
+    }
+    canopy_trace_post(self->sink, CANOPY_TRACE_ARRIVALS, &self->data);
 }
 
-/**
- * How old the messages were of which this tick took frames, and the state of the bus: three messages a frame, in the
- * order of the table. Without messages, one frame when the state is not the one told last.
- */
-static void send_arrivals(const canopy_trace_config_t *config, canopy_trace_state_t *self, const sink_t *sink,
-                          const canopy_trace_tick_t *tick)
+static void end_inputs(ages_t *self, unsigned ages)
+{
+    self->data.byte[5] = (uint8_t)(self->data.byte[5] | (ages << AGES_AT));
+    canopy_trace_post(self->sink, CANOPY_TRACE_INPUTS, &self->data);
+}
+
+static void put_age_byte(ages_t *self, uint32_t value)
+{
+    if (self->in_inputs && self->filled == (uint8_t)AGES_IN_INPUTS) {
+        end_inputs(self, AGES_AND_MORE);
+        self->in_inputs = false;
+        self->filled = 0;
+    } else if (!self->in_inputs && self->filled == (uint8_t)AGES_IN_FRAME) {
+        end_arrivals(self, 0);
+        self->filled = 0;
+    }
+    self->data.byte[(self->in_inputs ? 6u : 1u) + self->filled] = (uint8_t)(value & 0xFFu);
+    self->filled++;
+}
+
+static void put_age(ages_t *self, uint16_t age_ms)
+{
+    if (age_ms < (uint16_t)LONG_AGE) {
+        put_age_byte(self, age_ms);
+        return;
+    }
+    put_age_byte(self, LONG_AGE);
+    put_age_byte(self, age_ms);
+    put_age_byte(self, (uint32_t)age_ms >> 8);
+}
+
+/** What the tick worked with: time, frames and their ages, the state of the bus. */
+static void send_inputs(const canopy_trace_sink_t *sink, const canopy_trace_tick_t *tick)
 {
     const canopy_bus_state_t *bus = tick->bus;
-    unsigned conditions = (unsigned)tick->cycle->can_state | (tick->cycle->overload ? (unsigned)OVERLOAD_BIT : 0u) |
-                          (tick->returning ? (unsigned)RETURNING_BIT : 0u);
-    bool is_due = conditions != self->conditions;
-    unsigned filled = 0;
-    canopy_tx_trace_data_t data = {{0}};
+    uint32_t now = (uint32_t)(tick->cycle->now & UINT32_MAX);
+    uint32_t frames = bus->taken - sink->state->taken;
+    ages_t ages = {.sink = sink, .in_inputs = true};
 
-    self->conditions = (uint8_t)conditions;
-    data.byte[7] = (uint8_t)(tick->tick & 0xFFu);
-    for (uint16_t index = 0; index < bus->bus->rx_count; index++) {
-        if (!bus->rx[index].taken_then) {
-            continue;
+    sink->state->taken = bus->taken;
+    canopy_trace_put16(&ages.data.byte[0], now);
+    ages.data.byte[2] = (uint8_t)((now >> 16) & 0xFFu);
+    ages.data.byte[3] = (uint8_t)(bus->taken & 0xFFu);
+    ages.data.byte[4] = bus->check;
+    ages.data.byte[5] = (uint8_t)((unsigned)tick->cycle->can_state | (tick->cycle->overload ? (unsigned)OVERLOAD : 0u) |
+                                  (tick->returning ? (unsigned)RETURNING : 0u) |
+                                  (frames >= (uint32_t)MANY_FRAMES ? (unsigned)MANY : 0u));
+    if (frames >= (uint32_t)MANY_FRAMES) {
+        for (unsigned byte = 0; byte < 4u; byte++) {
+            put_age_byte(&ages, frames >> (8u * byte));
         }
-        if (filled == (unsigned)ARRIVALS) {
-            data.byte[0] = (uint8_t)(conditions | (filled << 4));
-            send(sink, config->arrivals, &data);
-            filled = 0;
+    }
+    for (uint16_t index = 0; index < bus->bus->rx_count && frames > 0u; index++) {
+        if (bus->rx[index].taken_then) {
+            put_age(&ages, bus->rx[index].age_ms);
         }
-        put16(&data.byte[1u + 2u * filled], bus->rx[index].age_ms);
-        filled++;
+    }
+    if (ages.in_inputs) {
+        end_inputs(&ages, ages.filled);
+    } else {
+        end_arrivals(&ages, LAST);
+    }
+}
+
+static void send_model(const canopy_trace_sink_t *sink)
+{
+    const canopy_tree_t *tree = sink->tree->tree;
+    canopy_tx_trace_data_t data = {{CANOPY_TRACE_VERSION << 4}};
+
+    canopy_trace_put16(&data.byte[1], tree->hash);
+    canopy_trace_put16(&data.byte[3], tree->hash >> 16);
+    canopy_trace_put16(&data.byte[5], tree->node_count);
+    canopy_trace_post(sink, CANOPY_TRACE_MODEL, &data);
+}
+
+static void send_clock(const canopy_trace_sink_t *sink, uint32_t upper)
+{
+    canopy_tx_trace_data_t data = {{(CANOPY_TRACE_VERSION << 4) | 1u}};
+
+    canopy_trace_put16(&data.byte[1], sink->tick);
+    canopy_trace_put16(&data.byte[3], upper);
+    data.byte[5] = (uint8_t)((upper >> 16) & 0xFFu);
+    canopy_trace_post(sink, CANOPY_TRACE_MODEL, &data);
+}
+
+/** Which tree this is, at a slow rate, and the upper bits of the time, also when they change. */
+static void send_slow(const canopy_trace_sink_t *sink, canopy_time_t now)
+{
+    canopy_trace_state_t *state = sink->state;
+    uint32_t upper = (uint32_t)((now >> 24) & 0xFFFFFFu);
+    bool is_due = canopy_trace_is_due(&state->model_in, sink->config->model_every);
+
+    if (state->announcements > 0u) {
+        state->announcements--;
         is_due = true;
     }
     if (is_due) {
-        for (unsigned byte = 1u + 2u * filled; byte < 7u; byte++) {
-            data.byte[byte] = 0;
-        }
-        data.byte[0] = (uint8_t)(conditions | (filled << 4));
-        send(sink, config->arrivals, &data);
+        send_model(sink);
+    }
+    if (is_due || upper != state->upper) {
+        send_clock(sink, upper);
+        state->upper = upper;
     }
 }
 
-/** One CanopyChange frame with one or two nodes, whose statuses count as sent. */
-static void send_change(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                        const canopy_tree_instance_t *tree, const sink_t *sink, const uint16_t pair[2])
+void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self, canopy_tree_instance_t *tree,
+                       canopy_tx_t *tx, const canopy_trace_tick_t *tick)
 {
-    canopy_tx_trace_data_t data = {{self->sequence}};
-    unsigned status_b = pair[1] != (uint16_t)NO_NODE ? tree->status[pair[1]] : (unsigned)NO_STATUS;
+    const canopy_trace_sink_t sink = {
+        .config = config, .state = self, .tree = tree, .tx = tx, .until = tick->until, .tick = tick->tick};
+    bool shows = canopy_trace_is_due(&self->snapshot_in, config->snapshot_every);
+    canopy_trace_choice_t choice = {.count = 0};
+    canopy_tx_trace_data_t snapshot;
+    uint16_t first;
 
-    put16(&data.byte[1], pair[0]);
-    put16(&data.byte[3], pair[1]);
-    data.byte[5] = (uint8_t)(tree->status[pair[0]] | (status_b << 4));
-    data.byte[6] = config->tree;
-    self->sequence++;
-    send(sink, config->change, &data);
-}
-
-/** The first `changes` nodes whose statuses have changed, two a frame. */
-static void send_changes(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                         const canopy_tree_instance_t *tree, const sink_t *sink, uint32_t changes)
-{
-    uint16_t pair[2] = {NO_NODE, NO_NODE};
-    unsigned filled = 0;
-
-    for (uint16_t node = 0; node < tree->tree->node_count && changes > 0u; node++) {
-        if (self->sent[node] == tree->status[node]) {
-            continue;
-        }
-        self->sent[node] = tree->status[node];
-        pair[filled++] = node;
-        changes--;
-        if (filled == 2u || changes == 0u) {
-            send_change(config, self, tree, sink, pair);
-            pair[1] = NO_NODE;
-            filled = 0;
-        }
+    if (shows) {
+        canopy_trace_show(&sink, &snapshot); /* before the statuses are marked as old */
+    }
+    first = canopy_trace_first_change(self, tree);
+    if (config->value_count > 0u) {
+        canopy_trace_choose(config, self, tree->application, &choice);
+    }
+    send_tick(&sink, tick,
+              (shows ? (unsigned)HAS_SNAPSHOT : 0u) | (first < tree->tree->node_count ? (unsigned)HAS_CHANGES : 0u),
+              choice.count);
+    send_inputs(&sink, tick);
+    send_slow(&sink, tick->cycle->now);
+    if (shows) {
+        snapshot.byte[0] = canopy_trace_number(self);
+        canopy_trace_post(&sink, CANOPY_TRACE_SNAPSHOT, &snapshot);
+    }
+    if (first < tree->tree->node_count) {
+        canopy_trace_changes(&sink, first);
+    }
+    if (choice.count > 0u) {
+        canopy_trace_values(&sink, tree->application, &choice);
     }
 }
 
-static void send_snapshot(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                          const canopy_tree_instance_t *tree, const sink_t *sink)
+void canopy_trace_start(const canopy_trace_config_t *config, canopy_trace_state_t *self, uint16_t nodes)
 {
-    uint16_t count = tree->tree->node_count;
-    canopy_tx_trace_data_t data;
-
-    data.byte[0] = self->sequence;
-    put16(&data.byte[1], self->next_node);
-    for (unsigned place = 0; place < SNAPSHOT_NODES; place += 2u) {
-        uint32_t node = self->next_node + place;
-        unsigned low = node < count ? tree->status[node] : (unsigned)NO_STATUS;
-        unsigned high = node + 1u < count ? tree->status[node + 1u] : (unsigned)NO_STATUS;
-
-        data.byte[3u + (place / 2u)] = (uint8_t)(low | (high << 4));
+    *self = (canopy_trace_state_t){.sent = self->sent, .told = self->told};
+    for (uint16_t node = 0; node < nodes; node++) {
+        self->sent[node] = (uint8_t)CANOPY_STATUS_NEVER;
     }
-    self->next_node = self->next_node + (uint32_t)SNAPSHOT_NODES < count
-                          ? (uint16_t)(self->next_node + (uint16_t)SNAPSHOT_NODES)
-                          : 0u;
-    self->sequence++;
-    send(sink, config->snapshot, &data);
+    for (uint16_t slot = 0; slot < config->value_count; slot++) {
+        self->told[slot] = 0;
+    }
 }
 
-static void send_health(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_instance_t *tree,
-                        const canopy_trace_tick_t *tick)
+void canopy_trace_follow_exchange(canopy_trace_state_t *self)
 {
-    const canopy_bus_counters_t *counters = &tick->bus->counters;
-    canopy_tx_counters_t tx;
-    canopy_tx_trace_data_t data;
-
-    canopy_tx_count(sink->tx, &tx);
-    put16(&data.byte[0], at_most16(canopy_bus_rejected(counters)));
-    put16(&data.byte[2], tick->is_filtered ? (uint32_t)FILTERED : at_most16(counters->unknown_id));
-    put16(&data.byte[4], at_most16(canopy_sum(canopy_sum(tx.expired, tx.replaced), tx.trace_dropped)));
-    put16(&data.byte[6], at_most16(tree->faults));
-    send(sink, config->health, &data);
-}
-
-static void send_model(const canopy_trace_config_t *config, const sink_t *sink, const canopy_tree_t *tree)
-{
-    canopy_tx_trace_data_t data = {{0}};
-
-    put16(&data.byte[0], tree->hash);
-    put16(&data.byte[2], tree->hash >> 16);
-    put16(&data.byte[4], tree->node_count);
-    send(sink, config->model, &data);
-}
-
-void canopy_trace_send(const canopy_trace_config_t *config, canopy_trace_state_t *self,
-                       const canopy_tree_instance_t *tree, canopy_tx_t *tx, const canopy_trace_tick_t *tick)
-{
-    const sink_t target = {.tx = tx, .until = tick->until};
-    const sink_t *sink = &target;
-    bool traces_nodes = config->change.id != CANOPY_TRACE_OFF;
-    uint32_t changes = traces_nodes ? count_changes(self, tree, 2u * config->changes_max) : 0u;
-
-    if (config->tick.id != CANOPY_TRACE_OFF) {
-        send_tick(config, self, sink, tick, changes);
-    }
-    if (config->inputs.id != CANOPY_TRACE_OFF) {
-        send_inputs(config, sink, tick);
-    }
-    if (config->arrivals.id != CANOPY_TRACE_OFF) {
-        send_arrivals(config, self, sink, tick);
-    }
-    send_changes(config, self, tree, sink, changes);
-    if (config->snapshot.id != CANOPY_TRACE_OFF) {
-        send_snapshot(config, self, tree, sink);
-    }
-    if (config->health.id != CANOPY_TRACE_OFF && tick->tick % config->health_every == 0u) {
-        send_health(config, sink, tree, tick);
-    }
-    if (config->model.id != CANOPY_TRACE_OFF && tick->tick % config->model_every == 0u) {
-        send_model(config, sink, tree->tree);
-    }
+    self->next_node = 0;
+    self->next_shown = 0;
+    self->snapshot_in = 0;
+    self->announcements = (uint8_t)ANNOUNCEMENTS;
 }

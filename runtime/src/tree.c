@@ -32,7 +32,7 @@
 static void forget_everything(canopy_tree_instance_t *self)
 {
     for (uint16_t node = 0; node < self->tree->node_count; node++) {
-        self->status[node] = (uint8_t)CANOPY_IDLE;
+        self->status[node] = (uint8_t)CANOPY_STATUS_NEVER;
     }
     for (uint16_t word = 0; word < self->tree->word_count; word++) {
         self->words[word] = 0;
@@ -226,7 +226,7 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
         break;
     case CANOPY_NODE_TRY_CATCH:
         /* The status first, so that the call is the last thing done: no frame of this function below a leaf's. */
-        self->status[node] |= (uint8_t)CANOPY_STATUS_WAS;
+        self->status[node] = canopy_status_reset(self->status[node]);
         canopy_try_catch_halt(self, node);
         return;
     case CANOPY_NODE_USER_CONTROL:
@@ -269,7 +269,7 @@ static void halt_node(canopy_tree_instance_t *self, uint16_t node)
     case CANOPY_NODE_TYPES:
         break;
     }
-    self->status[node] |= (uint8_t)CANOPY_STATUS_WAS;
+    self->status[node] = canopy_status_reset(self->status[node]);
 }
 
 canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now)
@@ -295,7 +295,7 @@ canopy_status_t canopy_tree_tick(canopy_tree_instance_t *self, canopy_time_t now
             canopy_index_t child = node;
             canopy_index_t next = at->end;
 
-            self->status[child] = (uint8_t)status;
+            self->status[child] = (uint8_t)step; /* canopy_status_stored(status) */
             if (child == 0u) {
                 return status;
             }
@@ -326,7 +326,7 @@ void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top)
     uint16_t node = top;
 
     while (node < end) {
-        bool running = self->status[node] == (uint8_t)CANOPY_RUNNING;
+        bool running = canopy_status_runs(self->status[node]);
         uint16_t next = nodes[node].end;
 
         if (running && next != node + 1u) {

@@ -14,12 +14,13 @@ import click
 
 from canopy.can_bus.steady import SteadyBus
 from canopy.canbus import CanBusError, split_spec
+from canopy.compiler.cli import HexNumber
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
 from canopy.process.say import Voice
 from canopy_sim.lcm_side import open_lcm_side
-from canopy_sim.messages import DescriptionError, RobotMessages, load_messages
+from canopy_sim.messages import DEFAULT_TRACE, DescriptionError, RobotMessages, load_messages
 from canopy_sim.plant import Plant
 from canopy_sim.process import BusGoneError, Simulation
 from canopy_sim.robot import Robot
@@ -69,12 +70,12 @@ class Pair(click.ParamType[tuple[int, int]]):
         return steps[0], steps[1]
 
 
-def read_dbc(_ctx: click.Context, _param: click.Parameter, value: Path) -> RobotMessages:
-    """Reads the DBC while the command line is read, so that a wrong one ends like a wrong option."""
+def read_dbc(path: Path, trace: int) -> RobotMessages:
+    """Reads the DBC; a wrong one ends like a wrong option."""
     try:
-        return load_messages(value)
+        return load_messages(path, trace)
     except DescriptionError as error:
-        raise click.BadParameter(str(error)) from error
+        raise click.BadParameter(str(error), param_hint="'--dbc'") from error
 
 
 def make_plant(power: tuple[int, int], posture: tuple[int, int]) -> Plant:
@@ -107,11 +108,17 @@ Examples:
 )
 @click.option(
     "--dbc",
-    "messages",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    callback=read_dbc,
     required=True,
     help="The bus description, examples/nao/nao.dbc.",
+)
+@click.option(
+    "--trace",
+    type=HexNumber(0, 0x1FFFFFF8),
+    metavar="ID",
+    default=f"0x{DEFAULT_TRACE:X}",
+    show_default=True,
+    help="Where the controller's trace begins, as it was built (TRACE, --trace): its CanopyTick ends a lock-step.",
 )
 @click.option("--lock-step", is_flag=True, help="One step of the plant for each tick of the controller.")
 @click.option(
@@ -139,7 +146,8 @@ Examples:
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one line of JSON.")
 def main(
     bus_name: str,
-    messages: RobotMessages,
+    dbc: Path,
+    trace: int,
     lock_step: bool,
     time_factor: float | None,
     power: tuple[int, int],
@@ -160,6 +168,7 @@ def main(
     """
     if lock_step and time_factor is not None:
         raise click.UsageError("--time-factor is for real time: in lock-step the controller's ticks are the clock.")
+    messages = read_dbc(dbc, trace)
     robot = Robot(messages, make_plant(power, posture))
     try:
         bus = SteadyBus(bus_name, Voice("canopy-sim"), create=True)

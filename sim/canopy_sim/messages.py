@@ -18,14 +18,18 @@ from cantools.database.can import Database, Message, Signal
 from canopy.compiler.dbc_file import load_dbc
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.limits import DATA_ID, RAW, TIME_MS, whole
+from canopy.live.trace_model import MESSAGES, VERSION
 from canopy_sim.e2e import Checker, Protector
 from canopy_sim.plant import PostureMode, PowerMode
 
-REFUSALS = ("flags", "length", "crc", "repeated", "sequence", "range")
+REFUSALS = ("flags", "length", "crc", "repeated", "sequence", "range", "version")
 """Why a frame is refused, in the order of the checks."""
 
 E2E_SIGNALS = {"E2E_CRC", "E2E_Counter"}
 TIMEOUT_IN_CYCLES = 5
+LARGEST_STANDARD_ID = 0x7FF
+DEFAULT_TRACE = 0x600
+"""Of the examples."""
 
 
 class DescriptionError(Exception):
@@ -175,26 +179,51 @@ class CommandMessage(Incoming):
         self.safe_mode = safe
 
 
+class HeartBeat:
+    """CanopyTick of the controller, which is in no DBC: it says that the tick's commands are complete."""
+
+    LENGTH = 8
+
+    def __init__(self, base: int) -> None:
+        """`base`: arbitration id of the trace's first message."""
+        self.arbitration_id = base
+        self.trace_ids = frozenset(range(base, base + len(MESSAGES)))
+        self._is_extended = base > LARGEST_STANDARD_ID
+
+    def check(self, frame: can.Message) -> None:
+        """Checks a frame with its id: flags, length, version.
+
+        Raises:
+            FrameRefusedError: It is none.
+        """
+        if frame.is_extended_id != self._is_extended or frame.is_fd or frame.is_remote_frame:
+            raise FrameRefusedError("flags")
+        if frame.dlc != self.LENGTH:
+            raise FrameRefusedError("length")
+        if frame.data[1] >> 4 != VERSION:
+            raise FrameRefusedError("version")
+
+
 class RobotMessages:
     """All messages of the robot."""
 
-    def __init__(self, database: Database) -> None:
-        """A DescriptionError says what the DBC lacks."""
+    def __init__(self, database: Database, trace: int) -> None:
+        """A DescriptionError says what the DBC lacks. `trace`: the controller's first trace id."""
         self.battery = Outgoing(database, "Battery", {"Charging", "Level", "ChargerDistance"})
         self.posture = Outgoing(database, "Posture", {"HeadX", "HeadHeight"})
         self.simulation_step = Outgoing(database, "SimulationStep", {"Step"})
         self.power_command = CommandMessage(database, "PowerCommand", PowerMode)
         self.posture_command = CommandMessage(database, "PostureCommand", PostureMode)
-        self.tick = Incoming(database, "CanopyTick", set())
-        self.known_ids = {message.frame_id for message in database.messages}
-        """Ids of the whole DBC."""
+        self.tick = HeartBeat(trace)
+        self.known_ids = {message.frame_id for message in database.messages} | self.tick.trace_ids
+        """Ids of the whole DBC, and of the trace."""
         for sensor in (self.battery, self.posture):
             if sensor.cycle <= 0:
                 raise DescriptionError(f"message {sensor.name} needs a GenMsgCycleTime: it is sent cyclically")
 
 
-def load_messages(dbc: Path) -> RobotMessages:
-    """Reads the DBC.
+def load_messages(dbc: Path, trace: int = DEFAULT_TRACE) -> RobotMessages:
+    """Reads the DBC. `trace`: arbitration id of the first message of the controller's trace.
 
     Raises:
         DescriptionError: The file cannot be read, is no DBC, or not one of this robot.
@@ -204,6 +233,6 @@ def load_messages(dbc: Path) -> RobotMessages:
     except CompileError as error:
         raise DescriptionError(f"{error.place}: {error.message}") from error
     try:
-        return RobotMessages(database)
+        return RobotMessages(database, trace)
     except DescriptionError as error:
         raise DescriptionError(f"{dbc}: {error}") from None

@@ -115,9 +115,9 @@ class Robot:
         self.accepted = 0
         self.refused: Counter[str] = Counter(dict.fromkeys(REFUSALS, 0))
         self.ignored = 0
-        """Frames of the DBC that the robot has no use for."""
+        """Frames of the DBC and of the trace that the robot has no use for."""
         self.unknown = 0
-        """Frames with an id that the DBC does not have."""
+        """Frames with other ids."""
         self.error_frames = 0
 
     def receive(self, frame: can.Message, now: float) -> bool:
@@ -142,7 +142,7 @@ class Robot:
         elif frame.arbitration_id == messages.posture_command.arbitration_id:
             self._posture.accept(messages.posture_command.unpack(frame)["Mode"], now)
         elif frame.arbitration_id == messages.tick.arbitration_id:
-            messages.tick.unpack(frame)
+            messages.tick.check(frame)
         else:
             known = frame.arbitration_id in messages.known_ids
             self.ignored += known

@@ -18,7 +18,7 @@ PARTS = {
     "begin": ("canopy_bus_begin_tick",),
     "tick": ("canopy_tree_tick",),
     "commit": ("canopy_bus_commit",),
-    "trace": ("canopy_trace_send",),
+    "trace": ("canopy_trace_send", "canopy_trace_health"),
     "transmit": ("canopy_tx_service",),
     # In receive and transmit, and there a second time.
     "e2e": ("canopy_e2e_check", "canopy_e2e_protect"),
@@ -36,6 +36,8 @@ class Application:
     leaves: tuple[str, ...]
     frames: dict[str, dict[str, Any]]
     options: tuple[str, ...] = ()
+    warm_up: int = 0
+    """Cycles before those that are counted."""
 
 
 _E2E = {"E2E_CRC": 0, "E2E_Counter": 0}
@@ -71,6 +73,28 @@ APPLICATIONS = (
 )
 
 
+IDLE_NODES = 1000
+_IDLE_DBC = """VERSION ""
+BU_: Controller
+BO_ 256 Nothing: 1 Controller
+ SG_ Zero : 0|8@1+ (1,0) [0|255] "" Vector__XXX
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
+BA_DEF_ SG_ "GenSigInactiveValue" INT 0 255;
+BA_DEF_DEF_ "GenMsgCycleTime" 50;
+BA_DEF_DEF_ "GenSigInactiveValue" 0;
+"""
+
+
+def idle(folder: Path) -> Application:
+    """A tree of IDLE_NODES nodes that are all ticked in every tick, always with the same results."""
+    (folder / "trees").mkdir(parents=True, exist_ok=True)
+    nodes = "<AlwaysSuccess/>" * (IDLE_NODES - 1)
+    tree = f'<root BTCPP_format="4"><BehaviorTree ID="Idle"><Sequence>{nodes}</Sequence></BehaviorTree></root>'
+    (folder / "trees" / "idle.xml").write_text(tree, encoding="utf-8")
+    (folder / "idle.dbc").write_text(_IDLE_DBC, encoding="utf-8")
+    return Application("idle", folder, "idle.xml", "idle.dbc", (), {}, warm_up=60)
+
+
 def _frames(application: Application) -> str:
     """The frames that arrive as C: bench_frames."""
     database = cantools.database.load_file(application.folder / application.dbc)
@@ -79,7 +103,7 @@ def _frames(application: Application) -> str:
         message = database.get_message_by_name(name)  # type: ignore[union-attr]
         data = message.encode(values)
         rows.append(f"{{.id = {message.frame_id}u, .length = {len(data)}, .data = {{{', '.join(map(str, data))}}}}}")
-    lines = ",\n    ".join(rows)
+    lines = ",\n    ".join(rows or ["{0}"])
     return (
         f'#include "cycle.h"\n\nconst canopy_can_frame_t bench_frames[] = {{\n    {lines}}};\n'
         f"const uint32_t bench_frame_count = {len(rows)};\n"
@@ -90,7 +114,17 @@ def generate(application: Application, folder: Path) -> Path:
     """The application in C, and frames.c; returns the folder with all that."""
     out = folder / application.name
     tree, dbc = application.folder / "trees" / application.tree, application.folder / application.dbc
-    options = ("--node", "Controller", "--period-ms", "50", "--name", application.name, *application.options)
+    options = (
+        "--node",
+        "Controller",
+        "--period-ms",
+        "50",
+        "--trace",
+        "0x600",
+        "--name",
+        application.name,
+        *application.options,
+    )
     build.run(*image.CANOPY, "compile", tree, "--dbc", dbc, *options, "-o", out)
     (out / "frames.c").write_text(_frames(application), encoding="utf-8")
     return out
@@ -114,11 +148,15 @@ def host_program(target: build.Target, application: Application, generated: Path
     return path
 
 
-def measure_host(program: Path) -> dict[str, float]:
+def measure_host(program: Path, warm_up: int = 0) -> dict[str, float]:
     """Part -> its instructions per cycle, and "whole". Raises RuntimeError when a frame was lost or rejected."""
+
+    def counted(cycles: int, functions: tuple[str, ...]) -> int:
+        return instructions.collected((program, str(cycles)), within=functions)[0] if cycles else 0
+
     parts = {"whole": (WHOLE,), **PARTS}
     return {
-        part: round(instructions.collected((program, str(CYCLES)), within=functions)[0] / CYCLES, 1)
+        part: round((counted(warm_up + CYCLES, functions) - counted(warm_up, functions)) / CYCLES, 1)
         for part, functions in parts.items()
     }
 
@@ -129,7 +167,7 @@ def bare_program(target: build.Target, application: Application, generated: Path
     return build.link_bare(target, path, *_sources(application, generated))
 
 
-def measure_cortex(program: Path) -> dict[str, float]:
+def measure_cortex(program: Path, warm_up: int = 0) -> dict[str, float]:
     """As measure_host(), and "worst": the most that a single cycle took."""
     core = cortex_m.Core(program)
     if core.call("bench_cycle_start") != 0:
@@ -137,9 +175,11 @@ def measure_cortex(program: Path) -> dict[str, float]:
     parts = {function: part for part, functions in PARTS.items() for function in functions}
     totals = dict.fromkeys(("whole", *PARTS), 0)
     worst = 0
-    for _ in range(CYCLES):
+    for number in range(warm_up + CYCLES):
         core.call("bench_cycle_prepare")
         counts = core.count_parts(WHOLE, parts, core.address("bench_loop"))
+        if number < warm_up:
+            continue
         worst = max(worst, counts["whole"])
         for part, count in counts.items():
             totals[part] += count

@@ -116,15 +116,19 @@ def _images(folder: Path, say: Progress) -> dict[str, Any]:
 def _cycles(folder: Path, say: Progress) -> dict[str, Any]:
     """Application -> compiler -> part -> instructions a cycle."""
     results: dict[str, Any] = {}
-    for application in cycle.APPLICATIONS:
+    for application in (*cycle.APPLICATIONS, cycle.idle(folder / "idle_tree")):
         generated = cycle.generate(application, folder)
         columns = results[application.name] = {}
         for target in build.HOSTS:
             say(f"{target.name}: cycles of {application.name}")
-            columns[target.name] = cycle.measure_host(cycle.host_program(target, application, generated, folder))
+            columns[target.name] = cycle.measure_host(
+                cycle.host_program(target, application, generated, folder), application.warm_up
+            )
         for target in build.CORTEX_M4:
             say(f"{target.name}: cycles of {application.name}")
-            columns[target.name] = cycle.measure_cortex(cycle.bare_program(target, application, generated, folder))
+            columns[target.name] = cycle.measure_cortex(
+                cycle.bare_program(target, application, generated, folder), application.warm_up
+            )
     return results
 
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from canopy.compiler.bounds import Others, make_bounds
 from canopy.compiler.bus_reader import Bus, read_bus
-from canopy.compiler.bus_timing import trace_frames
 
 NODE = "Controller"
 BITRATE = 500_000
 LOADS = (0, 30, 60, 90)
 BURST = 10
 LATENCY_US = 10  # CONTROLLER_COMMON
-CHANGES_MAX = 2
+TRACE_FRAMES = 6
+"""Of what they wait for only the number of frames in a tick depends: what is printed."""
 
 
 def _value(us: int | None) -> str:
@@ -27,7 +27,7 @@ def _value(us: int | None) -> str:
 
 def _row(bus: Bus, received: str, load: int) -> str:
     others = Others(load, BURST if load else 0, LATENCY_US)
-    bounds = make_bounds(bus, BITRATE, others, trace_frames(bus, CHANGES_MAX))
+    bounds = make_bounds(bus, BITRATE, others, TRACE_FRAMES)
     age = next(bound.age_us for bound in bounds.inputs if bound.name == received)
     waits = ", ".join(_value(output.wait_us) for output in bounds.outputs)
     safe = _value(bounds.outputs[-1].safe_us)

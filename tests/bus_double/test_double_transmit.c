@@ -14,26 +14,26 @@
 
 extern const canopy_app_t TEST_APP;
 
-enum { TICKS = 200, TRACE_MESSAGES = 7 };
+enum { TICKS = 200 };
 
 static rig_t rig;
 static uint32_t commands[PEER_MESSAGES_MAX]; /* seen on the wire, by message */
 static uint32_t commands_after_end;          /* of those, after the loop's last tick */
-static uint32_t traces[TRACE_MESSAGES];
+static uint32_t traces[CANOPY_TRACE_MESSAGES];
 static uint8_t sequence;
 static bool sequence_is_whole;
 static uint8_t last_value[PEER_MESSAGES_MAX];
 
-static const canopy_trace_id_t *trace_id(unsigned index)
+static void see_trace(canopy_trace_message_t message, const uint8_t *data)
 {
-    const canopy_trace_config_t *trace = TEST_APP.trace;
-    const canopy_trace_id_t *all[TRACE_MESSAGES] = {&trace->tick,     &trace->inputs, &trace->arrivals, &trace->change,
-                                                    &trace->snapshot, &trace->health, &trace->model};
+    bool counts = message == CANOPY_TRACE_TICK || message == CANOPY_TRACE_CHANGE || message == CANOPY_TRACE_SNAPSHOT;
 
-    return all[index];
+    traces[message]++;
+    if (counts) {
+        sequence_is_whole = sequence_is_whole && (data[message == CANOPY_TRACE_TICK ? 6 : 0] & 63u) == sequence;
+        sequence = (uint8_t)((sequence + 1u) & 63u);
+    }
 }
-
-enum { TRACE_TICK = 0, TRACE_INPUTS = 1, TRACE_CHANGE = 3, TRACE_SNAPSHOT = 4 };
 
 static void see(rig_t *self, const canopy_can_frame_t *frame, nanoseconds_t end)
 {
@@ -45,15 +45,8 @@ static void see(rig_t *self, const canopy_can_frame_t *frame, nanoseconds_t end)
         last_value[command] = frame->data[frame->length - 1u];
         return;
     }
-    for (unsigned index = 0; index < TRACE_MESSAGES; index++) {
-        if (frame->id != trace_id(index)->id) {
-            continue;
-        }
-        traces[index]++;
-        if (index == TRACE_TICK || index == TRACE_CHANGE || index == TRACE_SNAPSHOT) {
-            sequence_is_whole = sequence_is_whole && frame->data[0] == sequence;
-            sequence++;
-        }
+    if (frame->id - TEST_APP.trace->id < (uint32_t)CANOPY_TRACE_MESSAGES) {
+        see_trace((canopy_trace_message_t)(frame->id - TEST_APP.trace->id), frame->data);
     }
 }
 
@@ -91,9 +84,9 @@ static void check_all_left(void)
         TEST_ASSERT_EQUAL_HEX8(0, last_value[index]);
     }
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(TEST_APP.bus->tx_count, commands_after_end);
-    TEST_ASSERT_EQUAL_UINT32(ticks, traces[TRACE_TICK]);
-    TEST_ASSERT_EQUAL_UINT32(ticks, traces[TRACE_INPUTS]);
-    TEST_ASSERT_EQUAL_UINT32(ticks, traces[TRACE_SNAPSHOT]);
+    TEST_ASSERT_EQUAL_UINT32(ticks, traces[CANOPY_TRACE_TICK]);
+    TEST_ASSERT_EQUAL_UINT32(ticks, traces[CANOPY_TRACE_INPUTS]);
+    TEST_ASSERT_EQUAL_UINT32((ticks - 1u) / TEST_APP.trace->snapshot_every + 1u, traces[CANOPY_TRACE_SNAPSHOT]);
     TEST_ASSERT_TRUE_MESSAGE(sequence_is_whole, "a trace frame is missing, or out of order");
     TEST_ASSERT_EQUAL_UINT32(0, counters.expired);
     TEST_ASSERT_EQUAL_UINT32(0, counters.replaced);

@@ -132,7 +132,7 @@ static void write_entry(uint8_t entry, int32_t value)
 
 static int32_t take(script_t *script)
 {
-    if (run.status[script->node] != (uint8_t)CANOPY_RUNNING) {
+    if (!canopy_status_runs(run.status[script->node])) {
         script->taken = 0;
     }
     if (script->taken == script->value) {

@@ -239,7 +239,7 @@ static void expect_same_view(void)
     for (uint16_t node = 0; node < instance->tree->node_count; node++) {
         const canopy_node_t *row = &instance->tree->nodes[node];
 
-        EXPECT((canopy_tree_status_code(instance, node) & 7u) <= (unsigned)CANOPY_SKIPPED);
+        EXPECT(canopy_tree_status_code(instance, node) < CANOPY_CODE_NONE);
         if (row->type == CANOPY_NODE_STATEFUL_ACTION && row->leaf == 1u && row->parameter == node) {
             EXPECT(running[node] == (canopy_tree_status(instance, node) == CANOPY_RUNNING));
         }
@@ -297,7 +297,7 @@ static void expect_good_state(void)
         if (node != 0u && parent == CANOPY_RUNNING &&
             (instance->tree->nodes[row->parent].type == CANOPY_NODE_PARALLEL_ALL ||
              instance->tree->nodes[row->parent].type == CANOPY_NODE_REACTIVE_PARALLEL)) {
-            EXPECT(canopy_tree_status_code(instance, node) <= (uint8_t)CANOPY_SKIPPED);
+            EXPECT(canopy_tree_status_code(instance, node) <= CANOPY_CODE_RESET); /* not reset */
         }
         expect_good_words(node, row);
     }
@@ -319,18 +319,22 @@ static bool numbers_are_own(const canopy_tree_t *tree)
 
 static void run(tables_t *tables)
 {
-    static uint8_t status[NODES + 1];
-    static uint8_t sent[NODES + 1];
+    static uint32_t status_words[NODES / 4 + 1];
+    static uint32_t sent_words[NODES / 4 + 1];
+    uint8_t *const status = (uint8_t *)status_words;
     static uint16_t words[WORDS + 1];
     static canopy_tree_instance_t self;
     const canopy_can_t can = {.send = take_frame};
-    const canopy_trace_config_t config = {
-        .health_every = 3, .model_every = 2, .changes_max = (uint8_t)(1u + take8(&input) % 127u)};
+    const canopy_trace_config_t config = {.data_id = CANOPY_E2E_NONE,
+                                          .snapshot_every = 5,
+                                          .health_every = 3,
+                                          .model_every = 2,
+                                          .changes_max = (uint8_t)(1u + take8(&input) % CANOPY_TRACE_CHANGES_MAX)};
     static const canopy_bus_t no_messages;
     const canopy_bus_state_t bus = {.bus = &no_messages, .counters.unknown_id = take32(&input)};
     canopy_tx_trace_t waiting[64];
     canopy_tx_t tx;
-    canopy_trace_state_t trace = {.sent = sent};
+    canopy_trace_state_t trace = {.sent = (uint8_t *)sent_words};
     canopy_time_t now = take32(&input) * UINT64_C(0xFFFFFFFF);
     uint16_t count = tables->tree.node_count;
 
@@ -338,7 +342,7 @@ static void run(tables_t *tables)
         tables->nodes[node].parameter =
             tables->nodes[node].type <= CANOPY_NODE_STATEFUL_ACTION ? (uint16_t)NODES : tables->nodes[node].parameter;
     }
-    memset(sent, 0, sizeof sent);
+    canopy_trace_start(&config, &trace, count);
     memset(running, 0, sizeof running);
     status[count] = GUARD;
     words[tables->tree.word_count] = GUARD;

@@ -20,12 +20,11 @@ from e2e.p11 import e2e_p11_protect
 from canopy.unixbus import HEADER, decode, encode
 from integration.sim_peers import DBC
 
-INPUTS_ID = 0x604
-ARRIVALS_ID = 0x606
 TICK_ID = 0x600
 PERIOD_US = 50_000
-BUS_STATES = [0] * 12 + [1, 2, 3, 0x08, 0x44, 0x45, 0x40]
-"""CanState, Overload, Returning, as in CanopyArrivals' first byte."""
+BUS_STATES = [0] * 12 + [1, 2, 3, 0x08, 0x14, 0x15, 0x10]
+"""CanState, Overload, Returning, as in CanopyInputs' byte 5."""
+BEGIN = b"CANOPY RECORD 2\n"
 
 
 @dataclass
@@ -38,7 +37,7 @@ class Step:
     ages: dict[int, int] = field(default_factory=dict)
     """Of the frames with an id [ms]; 0 where none is given."""
     conditions: int = 0
-    """As in CanopyArrivals' first byte."""
+    """One of BUS_STATES."""
 
 
 def frame(identifier: int, data: bytes = b"", **more: bool) -> can.Message:
@@ -92,25 +91,22 @@ def read_frames(path: Path) -> list[can.Message]:
     return frames
 
 
-def record_of(steps: Sequence[Step]) -> list[can.Message]:
-    """A record, as drivers/include/canopy/clock/replay.h describes it."""
-    record = []
+def write_record(path: Path, steps: Sequence[Step]) -> None:
+    """A record, as drivers/include/canopy/clock/replay_files.h describes it."""
+    record = bytearray(BEGIN)
     for step in steps:
-        record.append(frame(INPUTS_ID, step.now.to_bytes(6, "little") + bytes(2)))
-        record.append(frame(ARRIVALS_ID, bytes([step.conditions]) + bytes(7)))
+        flags = (step.conditions >> 3 & 1) | (step.conditions >> 4 & 1) << 1
+        record += b"T" + step.now.to_bytes(8, "little") + bytes([step.conditions & 7, flags])
         for message in step.frames:
             age = step.ages.get(message.arbitration_id, 0)
-            record.append(frame(ARRIVALS_ID, bytes([step.conditions | 0x10]) + age.to_bytes(2, "little") + bytes(5)))
-            record.append(message)
-    return record
+            record += b"F" + age.to_bytes(2, "little") + encode(message)
+    path.write_bytes(record)
 
 
 def run_program(program: Path, steps: Sequence[Step], folder: Path) -> list[list[can.Message]]:
     """Gives a program frames, tick by tick; what it sends in each, and behind the last one at its end."""
     record, sent = folder / "made.record", folder / "made.sent"
-    with record.open("wb") as file:
-        for message in record_of(steps):
-            file.write(encode(message))
+    write_record(record, steps)
     command = [str(program), "--replay", str(record), "--sent", str(sent)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")

@@ -45,8 +45,6 @@ SLACK = 0.25
 SO_RCVBUFFORCE = 33
 """Of Linux: beyond net.core.rmem_max, for root; Python does not name it."""
 RECEIVE_BUFFER = 8 << 20
-FILTERED = 65535
-"""RxUnknown where the driver hands over the application's messages alone."""
 ATTEMPTS = 4
 """Of a run that is judged by an observer which must not miss a frame."""
 
@@ -302,8 +300,8 @@ def bad_frames_change_nothing_but_a_counter(build_dir: Path, bus: str) -> None:
             for bad in (*refused, *unknown):
                 noise.send(bad)
             observer.listen(0.1)
-        observer.wait_for(lambda: observer.values.get("CanopyHealth", {}).get("RxRejected") == rounds * len(refused), 5)
-        assert observer.values["CanopyHealth"]["RxUnknown"] == FILTERED
+        observer.wait_for(lambda: observer.trace.health.rx_rejected == rounds * len(refused), 5)
+        assert (observer.trace.health.rx_filtered, observer.trace.health.rx_unknown) == (True, None)
         assert set(observer.modes["PowerCommand"][before:]) == {"DoTask"}
         report = controller.end()
         simulator.end()
@@ -354,10 +352,11 @@ def the_mission_is_seen_in_lcm(build_dir: Path, bus: str) -> None:
     assert trees[-1]["application"] == "nao_home"
     assert structures[0]["name"] == ["Get home", "Walk Home", "Sit to Stand", "Lie down to Sit up"]
     assert structures[0]["parent"] == [-1, 0, 0, 0]
-    running = [
-        key for key, _ in groupby(tuple(tree["status"]).index(1, 1) for tree in trees if 1 in tree["status"][1:])
-    ]
+    assert all(trees[-1]["certain"])
+    running = [key for key, _ in groupby(tuple(tree["code"]).index(1, 1) for tree in trees if 1 in tree["code"][1:])]
     assert running == [3, 2, 1]
+    told = [key for key, _ in groupby(tuple(tree["running"]) for tree in trees if tree["running"])]
+    assert told == [("Lie down to Sit up",), ("Sit to Stand",), ("Walk Home",)]
     assert trees[-1]["root_status"] == Status.SUCCESS
     assert robots[-1]["head_x"] == 0
     assert robots[-1]["head_height"] == 0.5

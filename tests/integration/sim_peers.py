@@ -23,6 +23,11 @@ from integration.processes import OwnedProcess
 DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
 
 
+TICK_ID = 0x600
+TICK = bytes([0, 0x20, 0, 0, 0, 0, 0, 1])
+"""A CanopyTick."""
+
+
 class Simulator(OwnedProcess):
     """The process canopy-sim; ends with the context."""
 
@@ -123,5 +128,4 @@ class Controller:
     def answer(self, power: int, posture: int) -> None:
         """Both commands and CanopyTick: one tick of a controller."""
         self.send(self.command("PowerCommand", power), self.command("PostureCommand", posture))
-        tick = self.database.get_message_by_name("CanopyTick")
-        self.send(can.Message(arbitration_id=tick.frame_id, is_extended_id=False, data=bytes(8)))
+        self.send(can.Message(arbitration_id=TICK_ID, is_extended_id=False, data=TICK))

@@ -18,7 +18,7 @@ import pytest
 from canopy.canbus import open_bus
 from canopy.lcm_link import DEFAULT_URL
 from integration.lcm_netns import NO_ROUTE, LcmNetwork
-from integration.trace_source import Frame, TraceSource, to_message, write_model
+from integration.trace_source import SLOTS, TEXTS, VALUES, Frame, TraceSource, to_message, write_model
 
 PEER = str(Path(__file__).with_name("lcm_peer.py"))
 TYPES = ["CANOPY_TREE=tree_status_t", "CANOPY_TREE_STRUCTURE=tree_structure_t"]
@@ -73,9 +73,9 @@ def send(bus: can.BusABC, frames: list[Frame]) -> None:
 
 
 def test_each_tick_becomes_a_message_and_losses_are_said_once(tmp_path: Path, bus_dir: Path, bus: can.BusABC) -> None:
-    model = write_model(tmp_path)
-    source = TraceSource(4)
-    statuses = [[1, 3, 1, 0], [1, 3, 2, 1], [2, 9, 0, 2], [2, 9, 0, 2], [2, 9, 0, 2]]
+    model = write_model(tmp_path, values=VALUES, texts=TEXTS)
+    source = TraceSource(4, SLOTS, snapshot_every=1, values_max=3)
+    statuses = [[1, 3, 1, 0], [1, 3, 2, 1], [2, 9, 7, 2], [2, 9, 7, 2], [2, 9, 7, 3]]
     with LcmNetwork() as network:
         listen = [sys.executable, PEER, "listen", DEFAULT_URL, "60", *TYPES]
         with Process(network.command(listen)) as listener:
@@ -83,10 +83,11 @@ def test_each_tick_becomes_a_message_and_losses_are_said_once(tmp_path: Path, bu
             command = bridge_command(model, "--json", "--structure-period", "0.1")
             with Process(network.command(command)) as bridge:
                 wait_for_participants(bus_dir, 2)
-                send(bus, [source.health(RxRejected=7, RxUnknown=6, TxDropped=5, Faults=4)])
+                send(bus, [source.health(0, 7, 6, 5, last=4), source.health(4, 3, 2, 1)])
+                send(bus, [source.health(3, 0x21, 0, 0xF000, last=9)])
                 for number, tick in enumerate(statuses):
-                    frames = source.frames(tick, root=1 if number < 2 else 2, overruns=number)
-                    send(bus, frames if number not in (1, 3) else frames[:-1])  # the snapshot is lost, twice
+                    frames = source.frames(tick, root=1 if number < 2 else 2, overruns=number, values=[number, 0, 1])
+                    send(bus, frames if number not in (1, 3) else [*frames[:2], *frames[3:]])  # the snapshot is lost
                 trees: list[dict[str, Any]] = []
                 structures: list[dict[str, Any]] = []
                 while len(trees) < len(statuses) or len(structures) < 2:
@@ -95,16 +96,30 @@ def test_each_tick_becomes_a_message_and_losses_are_said_once(tmp_path: Path, bu
                 summary, errors = bridge.end()
     assert bridge.popen.returncode == 0
     assert [tree["tick"] for tree in trees] == [0, 1, 2, 3, 4]
-    # Of a tick with a loss nothing is certain; the snapshot of the next one makes all known again.
-    expected = [tick if number not in (1, 3) else [-1] * 4 for number, tick in enumerate(statuses)]
-    assert [tree["status"] for tree in trees] == expected
-    assert [tree["root_status"] for tree in trees] == [1, 1, 2, 2, 2]
+    # Of a tick with a loss nothing is certain: shown is what was told last. The next snapshot makes all certain again.
+    assert [tree["code"] for tree in trees] == [statuses[number] for number in (0, 0, 2, 2, 4)]
+    assert [tree["certain"] for tree in trees] == [[number not in (1, 3)] * 4 for number in range(5)]
+    assert [tree["since"] for tree in trees][2:] == [[2] * 4, [-1] * 4, [4] * 4]
+    assert [tree["since_exact"] for tree in trees] == [[True] * 4] + [[False] * 4] * 4
+    assert [(tree["root_status"], tree["root"]) for tree in trees] == [(1, "RUNNING")] * 2 + [(2, "SUCCESS")] * 3
+    assert [tree["running"] for tree in trees] == [["n2"], [], [], [], []]
+    assert [tree["failed"] for tree in trees] == [["n1"], [], [], [], ["n3"]]
+    assert [tree["complete"] for tree in trees] == [number not in (1, 3) for number in range(5)]
+    assert {tree["bus"] for tree in trees} == {"error-active"}
+    assert trees[-1]["value_name"][:3] == ["count", "arm/far", "warm"]
+    assert [tree["value"][0] for tree in trees] == ["0", "1", "2", "3", "4"]
+    assert trees[-1]["value"] == ["4", f"{2**32} mm", "0 °C", "none", "", "0", "0", "false"]
+    assert trees[-1]["value_certain"] == [True] * 8
     assert [tree["overruns"] for tree in trees] == [0, 1, 2, 3, 4]
-    assert [tree["trace_lost"] for tree in trees] == [0, 1, 1, 2, 2]
+    assert [tree["trace_lost"] for tree in trees] == [0, 0, 1, 1, 2]  # the next CanopyTick shows it
     assert abs(trees[-1]["utime"] / 1e6 - time.time()) < 60
-    fixed = {name: trees[-1][name] for name in ("application", "model_hash", "tree", "num_nodes")}
-    assert fixed == {"application": "nao_home", "model_hash": "0123456789abcdef", "tree": 0, "num_nodes": 4}
-    assert [trees[-1][name] for name in ("rx_rejected", "rx_unknown", "tx_dropped", "faults")] == [7, 6, 5, 4]
+    fixed = {name: trees[-1][name] for name in ("application", "model_hash", "num_nodes")}
+    assert fixed == {"application": "nao_home", "model_hash": "0123456789abcdef", "num_nodes": 4}
+    counters = ("rx_rejected", "rx_unknown", "rx_lost", "rx_backlogs", "leaf_faults", "rx_errors", "timeouts", "slips")
+    assert [trees[-1][name] for name in counters] == [7, 6, 5, 4, 3, 2, 1, 9]
+    assert trees[-1]["lateness"] == [1, 2] + [0] * 9 + [15]
+    assert [trees[-1][name] for name in ("tx_replaced", "longest_cycle", "can_state")] == [-1, -1, 0]
+    assert trees[-1]["health"].startswith("7 refused, 6 unknown, 5 lost by the driver, 4 backlogs, ")
     structure = structures[-1]
     assert (structure["application"], structure["model_hash"]) == ("nao_home", "0123456789abcdef")
     assert (structure["tree_id"], structure["num_nodes"], structure["parent"]) == ("GetHome", 4, [-1, 0, 0, 0])
@@ -126,7 +141,8 @@ def test_silence_publishes_the_tick_at_hand(tmp_path: Path, bus_dir: Path, bus: 
                 send(bus, TraceSource(4).frames([1, 0, 0, 0])[:1])
                 message = json.loads(listener.line())
                 summary, _ = bridge.end(signal.SIGINT)
-    assert (message["tick"], message["status"]) == (0, [-1] * 4)
+    assert (message["tick"], message["code"], message["bus"]) == (0, [0] * 4, "unknown")
+    assert message["certain"] == [False] * 4
     assert bridge.popen.returncode == 0
     assert "1 ticks seen (1 incomplete, 0 missed)" in summary
 

@@ -27,6 +27,7 @@ from canopy.view import line, picture
 from canopy.watch import Watch
 from integration.compilers import COMPILERS
 from integration.language import ROOT, WARNINGS
+from integration.trace_source import model_data
 
 SOURCES = [ROOT / "host_tools" / "canopy", ROOT / "sim" / "canopy_sim"]
 RUNTIME = ROOT / "runtime" / "include"
@@ -291,7 +292,7 @@ def test_a_watched_controller_cannot_write_to_the_terminal(hostile: Path, tmp_pa
     compile_room(hostile, "--name", "room")
     path = hostile / "out" / "room.model.json"
     data = json.loads(path.read_text(encoding="utf-8"))
-    data["trace"] = {"CanopyTick": 1}
+    data["trace"] = model_data(1)["trace"]
     data["application"] = EVIL
     path.write_text(json.dumps(data), encoding="utf-8")
     watch = Watch(load_model(path))

@@ -31,7 +31,10 @@ TYPE_MAP = [
 OUTPUTS: dict[str, tuple[list[str], list[Path]]] = {
     "room": (["--node", "Controller", "--period-ms", "100"], []),
     "cooler": (["--node", "Controller", "--period-ms", "100", "--include", "cooler_state.h"], [GOLDEN]),
-    "courier": (["--node", "Controller", "--period-ms", "50", "--include", "courier_types.h", *TYPE_MAP], [COURIER]),
+    "courier": (
+        ["--node", "Controller", "--period-ms", "50", "--include", "courier_types.h", "--trace", "0x600", *TYPE_MAP],
+        [COURIER],
+    ),
     "gripper": ([], []),
 }
 

@@ -256,8 +256,8 @@ def test_texts_in_scripts_are_told_apart(tmp_path: Path, firmware: Path) -> None
         ("{", "is no JSON"),
         ("[]", "is no model file of this version"),
         ('{"format": 9}', "is no model file of this version"),
-        ('{"format": 1, "application": "x"}', "this firmware takes no images"),
-        ('{"format": 1, "application": "x", "image": {}}', "bus.dbc is not of type str"),
+        ('{"format": 2, "application": "x"}', "this firmware takes no images"),
+        ('{"format": 2, "application": "x", "image": {}}', "bus.dbc is not of type str"),
     ],
 )
 def test_unusable_model_files_are_refused(tmp_path: Path, content: str | None, text: str) -> None:

@@ -19,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -27,7 +28,7 @@ from canopy.canbus import open_bus
 from canopy.model import load_model
 from canopy.view import line, picture, symbol
 from canopy.watch import Watch
-from integration.trace_source import TraceSource, database, to_message, write_model
+from integration.trace_source import SLOTS, TEXTS, VALUES, TraceSource, database, to_message, write_model
 
 SPEC = "unixbus:monitor"
 
@@ -97,7 +98,10 @@ def test_json_has_one_object_for_each_tick(tmp_path: Path, traffic: Callable[[],
     last = ticks[-1]
     assert last["signals"]["Battery"] == {"Charging": 0, "Level": 49.3, "ChargerDistance": -0.932}
     assert last["signals"]["PostureCommand"] == {"Mode": "WalkHome"}
-    assert [node["status"] for node in last["nodes"]] == ["RUNNING", "FAILURE", "RUNNING", "IDLE (was RUNNING)"]
+    assert [node["status"] for node in last["nodes"]] == ["RUNNING", "FAILURE", "RUNNING", "IDLE (halted now)"]
+    assert all(node["certain"] and node["told"] == node["status"] for node in last["nodes"])
+    assert all(0 <= node["since"] <= last["tick"] for node in last["nodes"])
+    assert (last["values"], last["crc_errors"], last["health"]["rx_rejected"]) == ([], 0, None)
     assert (last["root"], last["lost"], last["complete"], last["stale"]) == ("RUNNING", 0, True, [])
     assert 10 < last["ticks_per_s"] < 25
 
@@ -130,42 +134,115 @@ def test_a_terminal_gets_a_picture(tmp_path: Path, traffic: Callable[[], None]) 
     text, status = read_terminal(monitor(write_model(tmp_path)), 3)
     assert status == 0
     picture = text[text.rindex("GetHome") :]
-    for part in ("?  Get home", "(n1)", "FAILURE", "was RUNNING", "Level", "49.3 %", "-0.932 m", "WalkHome", "ticks/s"):
+    for part in (
+        "?  Get home",
+        "(n1)",
+        "FAILURE",
+        "IDLE (halted now)",
+        "Level",
+        "49.3 %",
+        "-0.932 m",
+        "WalkHome",
+        "ticks/s",
+    ):
         assert part in picture, picture
     assert "\x1b[1;33m?  Get home" in picture  # RUNNING is bold yellow
     assert "\x1b[1;31mFAILURE" in picture
     assert text.endswith("\x1b[?25h")  # the cursor is there again
 
 
-def test_the_state_of_the_bus_and_of_the_filter_is_shown(tmp_path: Path) -> None:
+def test_the_state_of_the_bus_and_the_counters_are_shown(tmp_path: Path) -> None:
     watch, source = Watch(load_model(write_model(tmp_path))), TraceSource(4)
 
-    def feed(*frames: tuple[int, bytes]) -> tuple[str, dict[str, object]]:
-        tick, *rest = source.frames([1, 3, 1, 9])
-        for frame in (tick, *frames, *rest):
+    def feed(*frames: tuple[int, bytes], **inputs: int) -> tuple[str, dict[str, Any]]:
+        for frame in (*frames, *source.frames([1, 3, 1, 9], values=(), **inputs)):
             watch.feed(*frame, 1.0)
         return line(watch, 1.0), watch.snapshot(1.0)
 
     text, data = feed()
     assert "; bus " not in text
-    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == (None, None, None, 0)
-    text, data = feed(source.arrivals(ages=[3]), source.health(RxUnknown=12))
-    assert "; bus " not in text
-    assert "0 refused, 12 unknown, 0 not sent" in text
-    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == ("error-active", False, False, 12)
-    text, data = feed(source.arrivals(state=2, overload=1), source.health(RxUnknown=65535, TxDropped=3))
+    assert "controller" not in text
+    assert (data["bus"], data["overload"], data["returning"]) == ("error-active", False, False)
+    text, data = feed(source.health(0, 3, 12, 0), source.health(1, 1, 0, 7))
+    assert "; controller: 3 refused, 12 unknown, 1 replaced, 7 trace frames dropped" in text
+    assert (data["health"]["rx_unknown"], data["health"]["rx_filtered"]) == (12, False)
+    pages = source.health(0, 0, 0, 0, filtered=True), source.health(2, 0, 1234, 0, last=1)
+    text, data = feed(*pages, CanState=2, Overload=1)
     assert "; bus error-passive, overload; " in text
-    assert "0 refused, unknown filtered, 3 not sent" in text
-    assert (data["bus"], data["overload"], data["returning"], data["rx_unknown"]) == (
-        "error-passive",
-        True,
-        False,
-        None,
-    )
+    assert "; controller: 0 refused, unknown filtered, longest cycle 1.234 ms, latest 2.56 ms" in text
+    assert (data["bus"], data["overload"], data["returning"]) == ("error-passive", True, False)
+    assert (data["health"]["rx_unknown"], data["health"]["rx_filtered"]) == (None, True)
     console = Console(width=160)
     with console.capture() as capture:
         console.print(picture(watch, 1.0, "title"))
     assert "; bus error-passive, overload; " in capture.get()
+
+
+def test_what_is_not_certain_is_not_shown_as_the_truth(tmp_path: Path) -> None:
+    watch = Watch(load_model(write_model(tmp_path, values=VALUES, texts=TEXTS)))
+    source = TraceSource(4, SLOTS, snapshot_every=1000, changes_max=1)
+    feed = [source.frames([1, 3, 1, 2], values=[5, 0, 0, 215]), source.frames([1, 3, 1, 7], values=[5, 0, 0, 215])]
+    for frame in feed[0] + feed[1]:
+        watch.feed(*frame, 1.0)
+    text, data = line(watch, 1.0), watch.snapshot(1.0)
+    assert "[n1 FAILURE, n2 RUNNING, n3 FAILURE (kept)]" in text
+    assert "; count 5, arm/far 0 mm, warm 21.5 °C, n1 none, word , exact 0, 2 more; " in text
+    assert data["nodes"][3] == {
+        "name": "n3",
+        "type": "Look",
+        "status": "FAILURE (kept)",
+        "told": "FAILURE (kept)",
+        "certain": True,
+        "since": 1,
+        "since_exact": True,
+    }
+    assert data["values"][2] == {
+        "kind": "entry",
+        "name": "warm",
+        "node": None,
+        "value": 21.5,
+        "unit": "°C",
+        "certain": True,
+    }
+    console = Console(width=160)
+    with console.capture() as capture:
+        console.print(picture(watch, 1.0, "title"))
+    assert "(n3)  FAILURE (kept) since tick 1" in capture.get()
+    assert "21.5 °C" in capture.get()
+    watch.feed(*source.frames([1, 3, 1, 7])[0], 1.0)
+    tick = source.frames([1, 3, 1, 2])
+    for frame in (tick[0], *tick[2:]):
+        watch.feed(*frame, 1.0)
+    text, data = line(watch, 1.0), watch.snapshot(1.0)
+    assert "[]" not in text
+    assert (data["nodes"][1]["status"], data["nodes"][1]["certain"]) == ("FAILURE", True)
+    watch.idle(2.0)
+    for frame in source.frames([2, 2, 2, 2])[1:]:
+        watch.feed(*frame, 2.0)
+    for frame in source.frames([2, 2, 2, 2]):
+        watch.feed(*frame, 2.0)
+    text, data = line(watch, 2.0), watch.snapshot(2.0)
+    assert " [] " in text
+    assert (data["nodes"][1]["status"], data["nodes"][1]["certain"], data["nodes"][1]["since"]) == (
+        "unknown",
+        False,
+        None,
+    )
+
+
+def test_a_frame_of_a_tick_that_is_long_over_is_not_believed(tmp_path: Path) -> None:
+    """Sixteen ticks later the numbers fit again; the time does not."""
+    watch, source = Watch(load_model(write_model(tmp_path))), TraceSource(4, snapshot_every=1000)
+    for frame in source.frames([0] * 4):
+        watch.feed(*frame, 0.0)
+    for frame in source.frames([1] * 4)[:2]:
+        watch.feed(*frame, 0.05)
+    source.tick, source.sequence = 17, 3
+    late = source.frames([2] * 4)[2:]
+    assert len(late) == 1
+    (view,) = watch.feed(*late[0], 0.05 + 16 * 0.05)
+    assert view.tick == 1
+    assert not any(node.certain for node in view.nodes)
 
 
 def test_silence_is_shown(tmp_path: Path) -> None:

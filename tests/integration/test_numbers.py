@@ -18,6 +18,7 @@ from canopy.cli import main
 from canopy.model import ModelError, load_model
 from integration.codec_harness import ROOT, WARNINGS
 from integration.compilers import COMPILERS
+from integration.trace_source import model_data
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -247,14 +248,16 @@ def test_a_model_file_with_a_number_out_of_its_limits_is_refused(tmp_path: Path,
 
 
 @pytest.mark.parametrize(
-    "change", [{"period_us": 10**12}, {"trace": {"CanopyTick": 2**29}}, {"trace": {"CanopyTick": -1}}]
+    "change",
+    [{"period_us": 10**12}, {"trace": {"base": 2**29}}, {"trace": {"base": -1}}, {"trace": {"changes_max": 999}}],
 )
 def test_a_model_file_to_watch_with_is_bounded(tmp_path: Path, change: dict[str, object]) -> None:
     assert run(tmp_path).exit_code == 0
     file = tmp_path / "out" / "app.model.json"
-    data = json.loads(file.read_text()) | {"trace": {"CanopyTick": 1}} | change
+    data = json.loads(file.read_text()) | {"trace": model_data(1)["trace"]}
+    data = {name: {**data[name], **to} if isinstance(to, dict) else to for name, to in (data | change).items()}
     file.write_text(json.dumps(data))
-    with pytest.raises(ModelError, match=r"period_us|trace\.CanopyTick"):
+    with pytest.raises(ModelError, match=r"period_us|trace\.base|trace\.changes_max"):
         load_model(file)
 
 

@@ -19,6 +19,7 @@ from click.testing import CliRunner
 
 from canopy.canbus import is_plain_data, open_bus
 from canopy.cli import main
+from canopy.live.codes import UNKNOWN, last_result
 from canopy.model import load_model
 from canopy.trace import Status
 from canopy.watch import Watch
@@ -98,7 +99,7 @@ class Observer(threading.Thread):
         self.ready = threading.Event()
 
     def run(self) -> None:
-        before: tuple[int, ...] = (0,) * len(self.watch.model.nodes)
+        before = (0,) * len(self.watch.model.nodes)
         with open_bus(self._bus_name) as bus:
             self.ready.set()
             while not self.stopped.is_set():
@@ -106,10 +107,11 @@ class Observer(threading.Thread):
                 if message is None or not is_plain_data(message):
                     continue
                 for view in self.watch.feed(message.arbitration_id, bytes(message.data), 0.0):
-                    for node, old, new in zip(self.watch.model.nodes, before, view.statuses, strict=True):
-                        if new != old and new != Status.UNKNOWN:
-                            self.history.append((node.name, Status(new % Status.PREVIOUSLY)))
-                    before = view.statuses
+                    codes = tuple(node.code if node.certain else UNKNOWN for node in view.nodes)
+                    for node, old, new in zip(self.watch.model.nodes, before, codes, strict=True):
+                        if new not in (old, UNKNOWN):
+                            self.history.append((node.name, last_result(new)))
+                    before = codes
 
 
 def test_the_courier_helps_itself_twice_and_arrives(courier: str, build_dir: Path, tmp_path: Path) -> None:

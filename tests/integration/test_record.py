@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from canopy.canbus import open_bus
 from canopy.cli import main
-from canopy.trace import Health, Status
+from canopy.trace import Status
 from integration import logs, missions
 from integration.processes import OwnedProcess
 from integration.sim_peers import Simulator
@@ -104,7 +104,7 @@ def run_mission(build_dir: Path, bus: str, name: str, output: Path) -> tuple[dic
                 observer.wait_for(lambda: observer.views[-1].root_status == Status.FAILURE, 60)
                 for bad in (logs.frame(0x100, b"\x01"), logs.frame(0x110, bytes(8)), logs.frame(0x123, b"abc")):
                     noise.send(bad)
-                observer.wait_for(lambda: (observer.trace.health or Health()).rx_rejected >= 2, 60)
+                observer.wait_for(lambda: (observer.trace.health.rx_rejected or 0) >= 2, 60)
                 with Simulator(bus, *start) as second:
                     observer.wait_for(lambda: observer.views[-1].root_status == Status.RUNNING, 60)
                     observer.wait_for(lambda: has_gone_on(2), 60)
@@ -241,7 +241,7 @@ def test_losses_and_a_late_start_are_said(bus: str, sender: can.BusABC, tmp_path
 
 def test_another_controllers_model_is_said_but_the_record_goes_on(bus: str, sender: can.BusABC, tmp_path: Path) -> None:
     with Record(bus, tmp_path / "run.log", "--model", str(write_model(tmp_path))) as record:
-        sender.send(logs.frame(0x605, bytes.fromhex("785634120700") + bytes(2)))
+        sender.send(logs.frame(0x607, bytes.fromhex("2078563412070000")))
         sender.send(logs.frame(0x123))
         data = record.end()
     assert (record.process.returncode, data["frames"], data["disagreements"]) == (0, 2, 1)

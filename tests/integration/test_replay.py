@@ -21,7 +21,7 @@ from integration import logs
 
 TICKS = 220
 BATTERY, POSTURE, POWER_COMMAND, POSTURE_COMMAND = 0x100, 0x110, 0x200, 0x210
-TICK, CHANGE, SNAPSHOT, HEALTH, INPUTS, MODEL, ARRIVALS = range(0x600, 0x607)
+TICK, INPUTS, ARRIVALS, SNAPSHOT, CHANGE, VALUE, HEALTH, MODEL = TRACE = range(0x600, 0x608)
 
 Log = list[can.Message]
 
@@ -54,11 +54,14 @@ def replay(build_dir: Path, tmp_path: Path) -> Callable[..., Result]:
     return run
 
 
+def tick_number(message: can.Message) -> int:
+    """Of a CanopyTick."""
+    return int.from_bytes(message.data[2:6], "little")
+
+
 def place_of(log: Log, identifier: int, tick: int) -> int:
     """Where the frame of a tick is: for commands the one before its CanopyTick, else the one behind it."""
-    at = next(
-        i for i, m in enumerate(log) if m.arbitration_id == TICK and int.from_bytes(m.data[1:5], "little") == tick
-    )
+    at = next(i for i, m in enumerate(log) if m.arbitration_id == TICK and tick_number(m) == tick)
     if identifier in (POWER_COMMAND, POSTURE_COMMAND):
         return next(i for i in range(at, -1, -1) if log[i].arbitration_id == identifier)
     return next(i for i in range(at, len(log)) if log[i].arbitration_id == identifier)
@@ -103,10 +106,11 @@ def test_a_run_is_equal(build_dir: Path, tmp_path: Path, replay: Callable[..., R
     assert (data["equal"], data["ticks"], data["reordered"], data["differences"]) == (True, 400, 0, [])
     assert data["inputs"] == ids.count(BATTERY) + ids.count(POSTURE) - 100
     # All that it sent but the two safe commands at its end.
-    assert data["frames"] == sum(ids.count(number) for number in (0x200, 0x210, *range(TICK, ARRIVALS + 1))) - 2
+    assert data["frames"] == sum(ids.count(number) for number in (0x200, 0x210, *TRACE)) - 2
     assert ids.count(CHANGE) > 20
-    assert ids.count(HEALTH) == ids.count(MODEL) == 20
-    rejected = next(m.data[0] for m in reversed(messages) if m.arbitration_id == HEALTH)
+    assert (ids.count(HEALTH), ids.count(SNAPSHOT)) == (100, 10)
+    assert ids.count(MODEL) >= 2 * 20
+    rejected = next(m.data[1] for m in reversed(messages) if m.arbitration_id == HEALTH and m.data[0] & 15 == 0)
     assert rejected >= 10
 
 
@@ -129,10 +133,10 @@ def test_every_format_is_read(replay: Callable[..., Result], log: Log, suffix: s
 def test_what_the_clock_and_the_driver_count_is_not_compared(replay: Callable[..., Result], log: Log) -> None:
     for message in log:
         if message.arbitration_id == TICK:
-            flip(message, 7, 0xFF)
+            flip(message, 7, 0xC0)
         if message.arbitration_id == HEALTH:
-            for byte in (2, 3, 4, 5):
-                flip(message, byte, 0xFF)
+            for byte in {0: (3, 4, 5, 6, 7), 4: (3, 4)}.get(message.data[0] & 15, range(1, 8)):
+                flip(message, byte, 0x7F)
     assert replay(log).exit_code == 0
 
 
@@ -157,12 +161,13 @@ def test_several_runs(replay: Callable[..., Result], log: Log) -> None:
 
 def test_a_tick_number_that_wraps_around_is_no_start(build_dir: Path, log: Log, tmp_path: Path) -> None:
     """Tick numbers moved so that 0 comes again where the sequence number is 0, too."""
-    first, sequence = 100, log[place_of(log, TICK, 100)].data[0]
+    first, sequence = 100, log[place_of(log, TICK, 100)].data[6]
     for message in log:
+        byte = 6 if message.arbitration_id == TICK else 0
         if message.arbitration_id in (TICK, CHANGE, SNAPSHOT):
-            message.data[0] = (message.data[0] - sequence) % 256
+            message.data[byte] = message.data[byte] & 0xC0 | (message.data[byte] - sequence) % 64
         if message.arbitration_id == TICK:
-            message.data[1:5] = ((int.from_bytes(message.data[1:5], "little") - first) % 2**32).to_bytes(4, "little")
+            message.data[2:6] = ((tick_number(message) - first) % 2**32).to_bytes(4, "little")
     recording = read_recording(logs.write_log(tmp_path / "x.log", log), load_model(model_file(build_dir)))
     assert (recording.runs, recording.joined) == ([], 2**32 - first)
 
@@ -193,23 +198,26 @@ def test_a_changed_command_is_named(replay: Callable[..., Result], log: Log) -> 
     assert "if loop.ticks == 117" in told.stderr
 
 
+def tick_before(log: Log, place: int) -> int:
+    """Of a trace frame."""
+    return tick_number(next(log[i] for i in range(place, -1, -1) if log[i].arbitration_id == TICK))
+
+
 def test_a_changed_status_names_the_node(replay: Callable[..., Result], log: Log) -> None:
-    place = place_of(log, SNAPSHOT, 60)
+    place = next(i for i, m in enumerate(log) if m.arbitration_id == SNAPSHOT and tick_before(log, i) >= 60)
     flip(log[place], 4, 0x03)  # node 2
-    (found,) = differs(replay(log, "--json"), 60)
+    (found,) = differs(replay(log, "--json"), tick_before(log, place))
     assert (found["message"], found["what"], found["frame"]) == ("CanopySnapshot", "node 2 'Sit to Stand'", place + 1)
     assert found["recorded"] != found["replayed"]
 
 
 def test_a_changed_change_names_the_nodes(replay: Callable[..., Result], log: Log) -> None:
     place = next(i for i, m in enumerate(log) if m.arbitration_id == CHANGE and i > 400)
-    tick = int.from_bytes(
-        log[next(i for i in range(place, 0, -1) if log[i].arbitration_id == TICK)].data[1:5], "little"
-    )
-    node = log[place].data[1]
-    log[place].data[1] = 77
+    tick = tick_before(log, place)
+    node = log[place].data[3] >> 4
+    log[place].data[1] = 5
     found = differs(replay(log, "--json"), tick)
-    assert {difference["what"].split(" '")[0] for difference in found} == {f"node {node}", "node 77"}
+    assert {f"node {node}", f"node {80 + node}"} <= {difference["what"].split(" '")[0] for difference in found}
     assert {difference["frame"] for difference in found} == {place + 1}
 
 
@@ -238,10 +246,9 @@ def test_frames_that_the_controller_never_had(replay: Callable[..., Result], log
     last = dict.fromkeys(range(-2, TICKS), 0)
     for message in log:
         if message.arbitration_id == TICK:
-            tick = int.from_bytes(message.data[1:5], "little")
-            last[tick] = last[tick - 1]
-        elif message.arbitration_id == ARRIVALS:
-            last[tick] = message.data[0] & 0x0F
+            tick = tick_number(message)
+        elif message.arbitration_id == INPUTS:
+            last[tick] = message.data[5] & 0x0F
     tick = next(
         tick
         for tick in range(110, TICKS)
@@ -288,28 +295,29 @@ def test_no_sensor_frames_at_all(replay: Callable[..., Result], log: Log) -> Non
     ("identifier", "text"),
     [
         (TICK, "a CanopyTick is missing"),
-        (SNAPSHOT, "1 trace frames are missing, or 1 more than 256"),
+        (SNAPSHOT, "1 trace frames are missing, or 1 more than 64"),
         (INPUTS, "CanopyInputs of tick 150 is missing"),
         (ARRIVALS, "CanopyArrivals of tick 150 is missing"),
     ],
 )
 def test_a_lost_trace_frame_is_a_gap(replay: Callable[..., Result], log: Log, identifier: int, text: str) -> None:
     place = place_of(log, identifier, 150)
+    tick = tick_before(log, place)
     del log[place]
     result = replay(log)
-    refused(result, "before frame ", text, "--ticks 1")
+    refused(result, "before frame ", text.replace("150", str(tick)), "--ticks 1")
     assert 0 <= int(re.findall(r"before frame (\d+)", result.stderr)[0]) - (place + 1) < 40
     cut = re.findall(r"--ticks (\d+)", result.stderr)[0]
-    assert cut == ("149" if identifier == TICK else "150")
+    assert int(cut) == (149 if identifier == TICK else tick)
     assert replay(log, "--ticks", cut).exit_code == 0
     refused(replay(log, "--ticks", "180"), f"has {cut} ticks of this run, not 180: before frame ")
 
 
 def test_whole_ticks_that_are_missing_are_a_gap(replay: Callable[..., Result], log: Log) -> None:
-    """256 trace frames: the sequence numbers alone do not tell."""
+    """64 trace frames: the sequence numbers alone do not tell."""
     first = place_of(log, TICK, 40)
     numbered = [i for i in range(first, len(log)) if log[i].arbitration_id in (TICK, CHANGE, SNAPSHOT)]
-    last = numbered[256]
+    last = numbered[64]
     left = log[:first] + [m for m in log[first:last] if m.arbitration_id < TICK] + log[last:]
     refused(replay(left), "missing")
 
@@ -374,8 +382,8 @@ def test_arguments_are_handed_on_and_the_record_is_kept(
     keep = tmp_path / "kept"
     assert replay(log, "--keep", str(keep), "--", "--quiet").exit_code == 0
     refused(replay(log, "--", "--lock-step"), "status 2 on the record: See nao_home --help.")
-    frames = logs.read_frames(keep)
-    assert [m.arbitration_id for m in frames].count(INPUTS) == TICKS
+    data = keep.read_bytes()
+    assert data.startswith(logs.BEGIN + b"T")
     result = replay(log[: len(log) // 2], "--keep", str(tmp_path / "no" / "folder"))
     refused(result, "No such file or directory")
 
@@ -414,15 +422,30 @@ def test_a_log_of_two_buses(replay: Callable[..., Result], log: Log) -> None:
     assert replay(mixed, "--channel", "can1").exit_code == 0
 
 
-@pytest.mark.parametrize("name", ["CanopyInputs", "CanopyArrivals"])
-def test_a_dbc_without_the_message(build_dir: Path, tmp_path: Path, log: Log, name: str) -> None:
-    data = json.loads(model_file(build_dir).read_text())
-    del data["trace"][name]
-    (tmp_path / "x.model.json").write_text(json.dumps(data))
-    (tmp_path / "nao.dbc").write_bytes((model_file(build_dir).parent / "nao.dbc").read_bytes())
-    path = logs.write_log(tmp_path / "run.log", log)
-    command = ["replay", str(path), "--model", str(tmp_path / "x.model.json"), "--program", "x"]
+def test_a_log_of_an_older_version_is_refused_with_a_way_out(replay: Callable[..., Result], log: Log) -> None:
+    for message in log:
+        if message.arbitration_id == TICK:  # Sequence, Tick, RootStatus, Changes, Overruns
+            message.data = bytearray([message.data[6] & 0x3F, *message.data[2:6], message.data[7] & 7, 0, 0])
+    place = next(i for i, m in enumerate(log) if m.arbitration_id == TICK)
     refused(
-        CliRunner().invoke(main, command),
-        f"trace: has no {name}, without which nothing can be replayed: add it to the DBC",
+        replay(log),
+        f"run.log: frame {place + 1} is no CanopyTick of trace version 2, but of version 0, or of an older one",
+        "replay this log with the release of Canopy that recorded it, and with the program and the model file of then",
+    )
+
+
+def test_the_upper_bits_of_the_time(replay: Callable[..., Result], log: Log) -> None:
+    """CanopyModel has them. Where it is missing the lower bits go on, and the next one shows whether that was right."""
+    model = [i for i, m in enumerate(log) if m.arbitration_id == MODEL and m.data[0] == 0x21]
+    assert len(model) > 10
+    left = [m for i, m in enumerate(log) if i != model[3]]
+    differs(replay(left, "--json"), tick_before(log, model[3]))  # it is missing, and was not counted
+    spoilt = copy.deepcopy(log)
+    spoilt[model[5]].data[4] += 1
+    result = replay(spoilt)
+    refused(result, f"the time of tick {tick_before(log, model[6])} is not known: CanopyModel frames are missing")
+    refused(
+        replay([m for m in log if m.arbitration_id != MODEL]),
+        "the time of tick 0 is not known: CanopyModel frames are missing",
+        "record again",
     )

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from canopy.live.frames import ArrivalsFrame
 from canopy.replay.inputs import Inputs
 from canopy.replay.log import LogError, Recording, Run, Taken
-from canopy.replay.ticks import Tick, next_check
+from canopy.replay.ticks import Tick, find_times, next_check
 
 
 def synthetic(seed: int, ticks: int = 60) -> tuple[Recording, Run, list[list[Taken]]]:
@@ -37,10 +38,11 @@ def synthetic(seed: int, ticks: int = 60) -> tuple[Recording, Run, list[list[Tak
             check = next_check(check, one.fold) if one.fold is not None else check
         place += len(group)
         taken = (taken + len(group)) % 256
-        tick = Tick(number, number, conditions=rnd.randrange(16))
+        tick = Tick(number, number, inputs=bytes(5) + bytes([rnd.randrange(16), 0, 0]))
+        tick.frames = len(group)
         tick.ages = [rnd.randrange(65536) for _ in {one.message for one in group}]
         check = tick.check_of_ages(check)
-        tick.inputs = bytes(6) + bytes([taken, check])
+        tick.inputs = bytes([0, 0, 0, taken, check]) + tick.inputs[5:]
         run.ticks.append(tick)
         groups.append(group)
     return Recording(Path("x.log"), received=received, runs=[run]), run, groups
@@ -95,3 +97,96 @@ def test_frames_of_one_sender_keep_their_order() -> None:
                 Inputs(recording, run, len(run.ticks))
             return
     pytest.fail("no such pair")
+
+
+def tick_with(list_of_ages: bytes, taken: int, many: bool = False) -> Tick:
+    """A tick whose list of ages goes through CanopyInputs and, where it is too long, CanopyArrivals."""
+    tick = Tick(5, 1)
+    count = min(len(list_of_ages), 3)
+    head = list_of_ages[:2].ljust(2, b"\0")
+    tick.take_inputs(bytes([0, 0, 0, taken % 256, 0, count << 5 | many << 7]) + head)
+    assert tick.is_whole == (count < 3)
+    rest = list_of_ages[2:]
+    while rest:
+        last = len(rest) <= 7
+        data = bytes([5 | min(len(rest), 7) << 4 | last << 7]) + rest[:7].ljust(7, b"\0")
+        frame = ArrivalsFrame.read(data)
+        assert frame is not None
+        tick.take_arrivals(frame)
+        assert tick.is_whole == last
+        rest = rest[7:]
+    return tick
+
+
+@pytest.mark.parametrize(
+    ("list_of_ages", "before", "taken", "many", "frames", "ages"),
+    [
+        (b"", 7, 7, False, 0, []),
+        (b"\x00", 255, 256, False, 1, [0]),
+        (b"\x05\xfe", 250, 253, False, 3, [5, 254]),
+        (b"\xff\xff\x00", 0, 1, False, 1, [255]),
+        (b"\xff\xff\xff\x07", 0, 9, False, 9, [65535, 7]),
+        (bytes(range(1, 30)), 0, 29, False, 29, list(range(1, 30))),
+        ((256).to_bytes(4, "little") + b"\x03", 9, 9, True, 256, [3]),
+        ((70_000).to_bytes(4, "little") + b"\x03\x04", 0, 70_000, True, 70_000, [3, 4]),
+    ],
+)
+def test_the_list_of_ages_is_read(
+    list_of_ages: bytes, before: int, taken: int, many: bool, frames: int, ages: list[int]
+) -> None:
+    tick = tick_with(list_of_ages, taken, many)
+    assert tick.read_ages(before)
+    assert (tick.frames, tick.ages) == (frames, ages)
+
+
+@pytest.mark.parametrize(
+    ("list_of_ages", "taken", "many"),
+    [
+        (b"\x05", 0, False),  # an age without a frame
+        (b"", 1, False),  # a frame without an age
+        (b"\x05\x06", 1, False),  # more messages than frames
+        (b"\xff", 1, False),  # cut off
+        (b"\xff\x01", 1, False),
+        (b"\x00\x01", 256, True),  # a number that is cut off
+        ((255).to_bytes(4, "little") + b"\x03", 255, True),  # not many
+        ((257).to_bytes(4, "little") + b"\x03", 256, True),  # not what Taken says
+    ],
+)
+def test_a_list_of_ages_that_cannot_be_is_refused(list_of_ages: bytes, taken: int, many: bool) -> None:
+    assert not tick_with(list_of_ages, taken, many).read_ages(0)
+
+
+def ticks_at(times: list[int], told: set[int]) -> list[Tick]:
+    """Ticks at certain times, with the upper bits of those at some places."""
+    return [
+        Tick(
+            number,
+            number,
+            inputs=(time % 2**24).to_bytes(3, "little") + bytes(5),
+            upper=time >> 24 if number in told else None,
+        )
+        for number, time in enumerate(times)
+    ]
+
+
+UPPER = 1 << 24
+
+
+@pytest.mark.parametrize(
+    ("times", "told", "known"),
+    [
+        ([5, 6, 7], {0}, 3),
+        ([5, 6, 7], set(), 0),
+        ([9 * UPPER - 1, 9 * UPPER, 9 * UPPER + 5], {0, 1}, 3),
+        ([9 * UPPER - 1, 9 * UPPER, 9 * UPPER + 5], {0}, 3),  # the frame is missing: the lower bits go back
+        ([9 * UPPER - 1, 9 * UPPER, 9 * UPPER + 5], {2}, 3),
+        ([5, 100 * UPPER, 300 * UPPER + 2], {0, 1, 2}, 3),  # ticks far apart tell them each time
+        ([5, 9 * UPPER + 1, 9 * UPPER + 2, 9 * UPPER + 3], {0, 3}, 1),  # more than once around, and nobody said when
+        ([5, 6, 7, UPPER], {0, 3}, 4),
+        ([UPPER, 7], {0, 1}, 1),  # back
+    ],
+)
+def test_the_times_of_ticks(times: list[int], told: set[int], known: int) -> None:
+    ticks = ticks_at(times, told)
+    assert find_times(ticks) == known
+    assert [tick.now for tick in ticks[:known]] == times[:known]

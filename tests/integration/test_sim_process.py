@@ -22,7 +22,7 @@ import pytest
 from canopy.lcm_link import CHANNEL_ROBOT, CHANNEL_ROBOT_COMMAND, DEFAULT_URL
 from integration import paper
 from integration.lcm_netns import NO_ROUTE, LcmNetwork
-from integration.sim_peers import DBC, Controller, Simulator
+from integration.sim_peers import DBC, TICK, TICK_ID, Controller, Simulator
 
 LCM_PEER = Path(__file__).parent / "lcm_peer.py"
 STOP, DO_TASK, DRIVE, CHARGE = range(4)
@@ -112,7 +112,7 @@ def test_lock_step_stops_the_robot_on_silence_and_goes_on_afterwards(bus: str, c
         controller.receive_message("SimulationStep")
         controller.answer(DO_TASK, SIT_UP)
         controller.receive_for(TIMEOUT + 2 * SLACK)
-        tick = can.Message(arbitration_id=0x600, is_extended_id=False, data=bytes(8))
+        tick = can.Message(arbitration_id=TICK_ID, is_extended_id=False, data=TICK)
         controller.send(tick)  # a tick without commands: those of before do not hold any more
         controller.receive_for(SLACK)
         controller.answer(DO_TASK, SIT_UP)
@@ -216,7 +216,8 @@ def test_bad_frames_are_refused_and_change_nothing_but_a_counter(bus: str, contr
         controller.receive_for(0.3)
         assert controller.sensors["Posture"]["HeadX"] < 10
         frames = simulator.end()["frames"]
-    assert frames["refused"] == {"flags": 2, "length": 2, "crc": 2, "repeated": 1, "sequence": 1, "range": 1}
+    refused = {"flags": 2, "length": 2, "crc": 2, "repeated": 1, "sequence": 1, "range": 1, "version": 0}
+    assert frames["refused"] == refused
     assert (frames["accepted"], frames["unknown"], frames["ignored"]) == (2, 1, 1)
     assert frames["received"] == 13
 

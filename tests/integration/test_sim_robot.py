@@ -17,9 +17,9 @@ from canopy_sim.messages import RobotMessages, load_messages
 from canopy_sim.plant import Plant
 from canopy_sim.process import Simulation, _Timer
 from canopy_sim.robot import CommandKind, DeskCommand, Robot
-from integration.sim_peers import DBC
+from integration.sim_peers import DBC, TICK, TICK_ID
 
-POWER_COMMAND, TICK = 0x200, 0x600
+POWER_COMMAND = 0x200
 DO_TASK = 1
 
 
@@ -156,6 +156,25 @@ def test_set_state_is_all_or_nothing(robot: Robot, plant: Plant) -> None:
     assert robot.minimum_battery == 199
 
 
+@pytest.mark.parametrize(("base", "extended"), [(0x600, False), (0x700, False), (0x18FF0000, True)])
+def test_a_tick_of_the_controllers_trace_is_known_by_its_id_its_form_and_its_version(base: int, extended: bool) -> None:
+    robot = Robot(load_messages(DBC, base), Plant())
+
+    def takes(identifier: int, data: bytes, **more: bool) -> bool:
+        form = {"is_extended_id": extended, **more}
+        return robot.receive(can.Message(arbitration_id=identifier, data=data, **form), 0.0)
+
+    assert takes(base, TICK)
+    assert not takes(base, TICK, is_extended_id=not extended)
+    assert not takes(base, TICK[:7])
+    assert not takes(base, bytes([0, 0x30, *TICK[2:]]))
+    assert not takes(base, bytes(8))  # as it was before there was a version
+    assert not takes(base + 7, TICK)
+    assert not takes(base + 8, TICK)
+    assert {name: count for name, count in robot.refused.items() if count} == {"flags": 1, "length": 1, "version": 2}
+    assert (robot.accepted, robot.ignored, robot.unknown) == (1, 1, 1)
+
+
 def test_error_frames_are_counted_apart(robot: Robot) -> None:
     robot.receive(
         can.Message(arbitration_id=POWER_COMMAND, is_error_frame=True, is_extended_id=False, data=bytes(8)), 0
@@ -177,7 +196,7 @@ def test_a_late_timer_skips_and_stays_on_its_grid() -> None:
 def test_a_robot_that_sends_no_sensors_still_gives_the_steps(robot: Robot, messages: RobotMessages) -> None:
     """STOP_SENDING is a fault of the sensors; SimulationStep is the clock of the simulation."""
     robot.execute(DeskCommand(CommandKind.STOP_SENDING))
-    tick = can.Message(arbitration_id=TICK, is_extended_id=False, data=bytes(8))
+    tick = can.Message(arbitration_id=TICK_ID, is_extended_id=False, data=TICK)
     with can.Bus("sim", interface="virtual") as bus, can.Bus("sim", interface="virtual") as peer:
         simulation = Simulation(bus, messages, robot, steps=2)
         thread = threading.Thread(target=simulation.run_lock_step)
@@ -222,7 +241,7 @@ class FullBus(can.BusABC):
         raise self.error
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        return can.Message(arbitration_id=TICK, is_extended_id=False, data=bytes(8)), False
+        return can.Message(arbitration_id=TICK_ID, is_extended_id=False, data=TICK), False
 
 
 def test_a_full_transmit_buffer_drops_and_goes_on(robot: Robot, messages: RobotMessages) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import lcm
 import pytest
 
-from canopy.bridge import status_message, structure_message
+from canopy.live.lcm_messages import status_message, structure_message
 from canopy.model import load_model
 from canopy.spy import find_jar
 from canopy.trace import TraceDecoder
@@ -83,7 +83,8 @@ def test_lcm_spy_finds_and_decodes_all_types(
     assert done.returncode == 0, done.stdout + done.stderr
     tree, structure, state, command = [text for text in done.stdout.splitlines() if text.startswith("CANOPY_")]
     assert tree.startswith("CANOPY_TREE canopy_msgs.tree_status_t utime=5 application=nao_home ")
-    assert " tick=0 tree=0 num_nodes=4 status=1,3,9,2 root_status=1 " in tree
+    assert " tick=0 root=RUNNING bus=error-active num_running=0 running= num_failed=1 failed=n1 health= " in tree
+    assert " num_nodes=4 code=1,3,9,2 certain=true,true,true,true since=0,0,0,0 " in tree
     assert structure.startswith("CANOPY_TREE_STRUCTURE canopy_msgs.tree_structure_t ")
     assert (
         " tree_id=GetHome num_nodes=4 parent=-1,0,0,0 type=ReactiveFallback,Look,Look,Look name=Get home,n1"

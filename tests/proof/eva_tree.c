@@ -42,7 +42,8 @@ static const shape_t shapes[CANOPY_NODE_TYPES] = {
 
 static canopy_tree_instance_t instance;
 static canopy_tree_t tree;
-static uint8_t any_idle; /* Any code of a node that is IDLE. */
+static uint8_t any_idle; /* Any byte of a node that is IDLE. */
+static uint8_t any_mark; /* CANOPY_STATUS_OLD, or 0. */
 static uint8_t ticked[NODES];
 static canopy_status_t acts[NODES]; /* What a StatefulAction knows of itself. */
 
@@ -143,7 +144,7 @@ static uint32_t child_done(canopy_tree_instance_t *self, uint16_t node, uint16_t
 
 static void halt(canopy_tree_instance_t *self, uint16_t node)
 {
-    /*@ assert control_runs: self->status[node] == CANOPY_RUNNING; */
+    /*@ assert control_runs: (self->status[node] & CANOPY_STATUS_RUNS) != 0; */
     (void)self;
     (void)node;
 }
@@ -247,12 +248,13 @@ static void forget(const canopy_node_t *nodes, uint8_t *status, uint16_t *words)
     for (uint16_t node = 0; node < tree.node_count; node++) {
         uint8_t type = nodes[node].type;
 
-        for (uint8_t word = words_in_use(type, status[node] == (uint8_t)CANOPY_RUNNING); word < shapes[type].words;
-             word++) {
+        for (uint8_t word = words_in_use(type, canopy_status_runs(status[node])); word < shapes[type].words; word++) {
             words[nodes[node].state + word] = (uint16_t)Frama_C_unsigned_int_interval(0, UINT16_MAX);
         }
-        if (status[node] == (uint8_t)CANOPY_IDLE || status[node] > (uint8_t)CANOPY_SKIPPED) {
+        if (canopy_status_now(status[node]) == CANOPY_IDLE) {
             status[node] = any_idle;
+        } else {
+            status[node] |= any_mark; /* as the trace does, or not */
         }
         ticked[node] = 0;
     }
@@ -264,7 +266,7 @@ static void forget(const canopy_node_t *nodes, uint8_t *status, uint16_t *words)
 static void nothing_runs(void)
 {
     for (uint16_t node = 0; node < tree.node_count; node++) {
-        /*@ assert halted: instance.status[node] != CANOPY_RUNNING && acts[node] != CANOPY_RUNNING; */
+        /*@ assert halted: (instance.status[node] & CANOPY_STATUS_RUNS) == 0 && acts[node] != CANOPY_RUNNING; */
     }
 }
 
@@ -287,8 +289,11 @@ int main(void)
         (!IS_INNER(inner) || children != (least > 2u || most < 2u ? least : 2u))) {
         return 0;
     }
-    any_idle =
-        (uint8_t)Frama_C_nondet(CANOPY_IDLE, Frama_C_interval(CANOPY_STATUS_WAS, CANOPY_STATUS_WAS + CANOPY_SKIPPED));
+    any_mark = (uint8_t)Frama_C_nondet(0, CANOPY_STATUS_OLD);
+    any_idle = (uint8_t)Frama_C_nondet(canopy_status_reset(canopy_status_stored(CANOPY_RUNNING)),
+                                       Frama_C_interval(canopy_status_reset(canopy_status_stored(CANOPY_SUCCESS)),
+                                                        canopy_status_reset(canopy_status_stored(CANOPY_SKIPPED))));
+    any_idle = (uint8_t)Frama_C_nondet(CANOPY_STATUS_NEVER, Frama_C_nondet(CANOPY_STATUS_WAS, any_idle) | any_mark);
     tree = (canopy_tree_t){.nodes = nodes,
                            .leaves = leaves,
                            .controls = controls,
@@ -307,7 +312,7 @@ int main(void)
         switch (Frama_C_interval(0, 2)) {
         case 0: {
             canopy_status_t root = canopy_tree_tick(&instance, Frama_C_unsigned_long_long_interval(0, UINT64_MAX));
-            /*@ assert result: CANOPY_RUNNING <= root <= CANOPY_SKIPPED && instance.status[0] == root; */
+            /*@ assert result: CANOPY_RUNNING <= root <= CANOPY_SKIPPED && instance.status[0] == root + CANOPY_STATUS_BASE; */
             break;
         }
         case 1:

@@ -104,7 +104,20 @@ def all_runs(every_inner: bool) -> list[Run]:
     ]
     loop = [
         f"runtime/src/{part}.c"
-        for part in ("tree", "bus", "can_state", "loop", "loop_run", "trace", "tx", "tx_service", "e2e")
+        for part in (
+            "tree",
+            "bus",
+            "can_state",
+            "loop",
+            "loop_run",
+            "trace",
+            "trace_health",
+            "trace_nodes",
+            "trace_values",
+            "tx",
+            "tx_service",
+            "e2e",
+        )
     ]
     generated = [str(path) for path in sorted(application.glob("*.c"))]
     runs += [

@@ -17,6 +17,7 @@ enum {
     TX = 2,
     TX_ID = 0x200,
     TRACE_PLACES = 16,
+    TRACE_ID = 0x600,
     RX_MAX = 4,
     TIMEOUT_US = 10000,
     SAFE = 7,
@@ -91,7 +92,13 @@ static const canopy_bus_t tables = {
 static const canopy_node_t nodes[] = {{.type = CANOPY_NODE_SYNC_ACTION, .end = 1}};
 static const canopy_leaf_t leaves[] = {{.tick = leaf_tick}};
 static const canopy_tree_t tree = {.nodes = nodes, .leaves = leaves, .node_count = 1, .leaf_count = 1};
-static canopy_trace_config_t trace;
+/* What a traced one has: `.trace` of the application. */
+static const canopy_trace_config_t trace = {.id = TRACE_ID,
+                                            .data_id = CANOPY_E2E_NONE,
+                                            .changes_max = 1,
+                                            .snapshot_every = 1000,
+                                            .health_every = 1,
+                                            .model_every = 1000};
 
 /** The memory of one application. */
 typedef struct {
@@ -109,22 +116,11 @@ typedef struct {
 
 static inline canopy_app_t small_app(small_memory_t *memory)
 {
-    trace = (canopy_trace_config_t){.tick = {.id = CANOPY_TRACE_OFF},
-                                    .inputs = {.id = CANOPY_TRACE_OFF},
-                                    .arrivals = {.id = CANOPY_TRACE_OFF},
-                                    .change = {.id = CANOPY_TRACE_OFF},
-                                    .snapshot = {.id = CANOPY_TRACE_OFF},
-                                    .health = {.id = CANOPY_TRACE_OFF},
-                                    .model = {.id = CANOPY_TRACE_OFF},
-                                    .health_every = 1,
-                                    .model_every = 1,
-                                    .changes_max = 1};
     while_ticking = NULL;
     return (canopy_app_t){.name = "small",
                           .period = PERIOD_US,
                           .tree = &tree,
                           .bus = &tables,
-                          .trace = &trace,
                           .rx_max = RX_MAX,
                           .frame_us = FRAME_US,
                           .tree_instance = &memory->instance,
@@ -139,7 +135,8 @@ static inline canopy_app_t small_app(small_memory_t *memory)
                                         .trace = memory->places,
                                         .trace_capacity = TRACE_PLACES},
                           .trace_state = &memory->trace_state,
-                          .sent = &memory->sent};
+                          .sent = &memory->sent,
+                          .nodes_max = 1};
 }
 
 #endif

@@ -286,14 +286,14 @@ static void try_catch_may_tick_its_handler_when_it_is_halted(void)
     START(nodes, yes);
     EXPECT("FR", CANOPY_RUNNING, "ab");
     EXPECT("SRS", CANOPY_SUCCESS, "ab!c");
-    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 4));
+    TEST_ASSERT_EQUAL(CANOPY_CODE_RESET + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 4));
     TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 2));
     EXPECT("SRS", CANOPY_SUCCESS, "a");
     /* A SyncAction that is RUNNING counts as FAILURE, here too. */
     EXPECT("FR", CANOPY_RUNNING, "ab");
     EXPECT("SRR", CANOPY_SUCCESS, "ab!c");
     TEST_ASSERT_EQUAL_UINT32(1, bench.instance.faults);
-    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_FAILURE, canopy_tree_status_code(&bench.instance, 4));
+    TEST_ASSERT_EQUAL(CANOPY_CODE_RESET + CANOPY_FAILURE, canopy_tree_status_code(&bench.instance, 4));
 }
 
 static void a_halt_goes_deepest_first_and_once(void)
@@ -333,8 +333,8 @@ static void statuses_are_kept_for_monitors(void)
     TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 3));
     EXPECT("SRS", CANOPY_SUCCESS, "ab!");
     TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 1));
-    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 1));
-    TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_RUNNING, canopy_tree_status_code(&bench.instance, 2));
+    TEST_ASSERT_EQUAL(CANOPY_CODE_RESET + CANOPY_SUCCESS, canopy_tree_status_code(&bench.instance, 1));
+    TEST_ASSERT_EQUAL(CANOPY_CODE_RESET + CANOPY_RUNNING, canopy_tree_status_code(&bench.instance, 2));
 }
 
 static void a_single_leaf_is_a_tree(void)

@@ -86,6 +86,7 @@ static void load_and_run(const uint8_t *bytes, size_t size)
 {
     TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK, canopy_image_load(&exchange_image, bytes, size, NULL));
     TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&exchange_image, &loop, time));
+    TEST_ASSERT_EQUAL_UINT8(3, exchange_app.trace_state->announcements); /* the trace tells that it is another tree */
 }
 
 /** Ticks the tree that is there from the start on and keeps, or compares, what there is to be seen. */

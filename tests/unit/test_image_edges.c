@@ -163,6 +163,17 @@ static void an_image_is_run_once_for_each_load(void)
     TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&exchange_image, &loop, time));
 }
 
+static void an_image_that_was_loaded_is_given_up_by_the_next_load(void)
+{
+    uint16_t where;
+
+    TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK, load_into(&exchange_image, &where));
+    copy[AT_CRC] ^= 1u;
+    TEST_ASSERT_TRUE(load_into(&exchange_image, &where) != CANOPY_IMAGE_OK);
+    TEST_ASSERT_EQUAL_INT(CANOPY_ERROR_NOT_FOUND, canopy_image_run(&exchange_image, &loop, time));
+    TEST_ASSERT_TRUE(canopy_image_running(&exchange_image) == 0u);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -172,5 +183,6 @@ int main(void)
     RUN_TEST(a_kind_number_that_the_image_does_not_have_is_refused);
     RUN_TEST(values_are_not_read_from_what_lies_behind_them);
     RUN_TEST(an_image_is_run_once_for_each_load);
+    RUN_TEST(an_image_that_was_loaded_is_given_up_by_the_next_load);
     return UNITY_END();
 }

@@ -1,21 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/** @file The fixed-period loop and the trace, with a clock and a bus that do what the test says. */
+/** @file The fixed-period loop, with a clock and a bus that do what the test says. */
 #include <string.h>
 
 #include "canopy/loop.h"
 #include "fake_can.h"
 #include "unity.h"
 
-enum {
-    NODES = 13,
-    PERIOD_US = 1000,
-    TICK_ID = 0x600,
-    CHANGE_ID = 0x601,
-    SNAPSHOT_ID = 0x602,
-    HEALTH_ID = 0x603,
-    INPUTS_ID = 0x604,
-    MODEL_ID = 0x605
-};
+enum { NODES = 13, PERIOD_US = 1000 };
 
 /* --- an application by hand: a ReactiveFallback over twelve conditions -------------------------------------------- */
 
@@ -46,21 +37,9 @@ static void set_cycle(void *input, const canopy_cycle_t *its)
 }
 
 static const canopy_bus_t bus = {.reset_output = reset_output, .set_cycle = set_cycle};
-static const canopy_trace_config_t trace = {.tick = {.id = TICK_ID},
-                                            .change = {.id = CHANGE_ID},
-                                            .snapshot = {.id = SNAPSHOT_ID},
-                                            .inputs = {.id = CANOPY_TRACE_OFF},
-                                            .arrivals = {.id = CANOPY_TRACE_OFF},
-                                            .health = {.id = HEALTH_ID},
-                                            .model = {.id = CANOPY_TRACE_OFF},
-                                            .health_every = 4,
-                                            .changes_max = 2,
-                                            .tree = 3};
 static canopy_tree_instance_t instance;
 static canopy_bus_state_t bus_state;
-static canopy_trace_state_t trace_state;
 static uint8_t status[NODES];
-static uint8_t sent[NODES];
 static int image;
 static canopy_tx_t tx;
 static canopy_tx_trace_t waiting[8];
@@ -70,16 +49,13 @@ static const canopy_app_t app = {.name = "test",
                                  .frame_us = 220,
                                  .tree = &tree,
                                  .bus = &bus,
-                                 .trace = &trace,
                                  .tree_instance = &instance,
                                  .status = status,
                                  .bus_state = &bus_state,
                                  .input = &image,
                                  .output = &image,
                                  .tx = &tx,
-                                 .tx_memory = {.trace = waiting, .trace_capacity = 8},
-                                 .trace_state = &trace_state,
-                                 .sent = sent};
+                                 .tx_memory = {.trace = waiting, .trace_capacity = 8}};
 
 /* --- a clock that is late by what the test says ------------------------------------------------------------------- */
 
@@ -238,149 +214,6 @@ static void faults_are_counted_and_reported(void)
     TEST_ASSERT_EQUAL_UINT64(5, last_now);
 }
 
-static const canopy_can_frame_t *only(uint32_t id, unsigned *count)
-{
-    const canopy_can_frame_t *last = NULL;
-
-    *count = 0;
-    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
-        if (fake.tx[frame].id == id) {
-            last = &fake.tx[frame];
-            (*count)++;
-        }
-    }
-    return last;
-}
-
-static void the_trace_tells_what_changed_and_sends_the_rest_later(void)
-{
-    /* Tick 0: 13 nodes change (12 conditions fail and are reset, the root fails); two frames hold four of them. */
-    static const uint8_t tick_0[] = {0, 0, 0, 0, 0, 0x33, 4, 0};
-    static const uint8_t change_0[] = {1, 0, 0, 1, 0, 0xB3, 3, 0};
-    static const uint8_t snapshot_0[] = {3, 0, 0, 0xB3, 0xBB, 0xBB, 0xBB, 0xBB};
-    static const uint8_t health_0[] = {0, 0, 0, 0, 0, 0, 0, 0};
-    static const uint8_t snapshot_1[] = {7, 10, 0, 0xBB, 0xFB, 0xFF, 0xFF, 0xFF};
-    unsigned count;
-
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT(5, fake.tx_count);
-    TEST_ASSERT_EQUAL_HEX32(TICK_ID, fake.tx[0].id);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(tick_0, fake.tx[0].data, 8);
-    TEST_ASSERT_EQUAL_HEX32(CHANGE_ID, fake.tx[1].id);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(change_0, fake.tx[1].data, 8);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(snapshot_0, only(SNAPSHOT_ID, &count)->data, 8);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(health_0, only(HEALTH_ID, &count)->data, 8);
-    fake.tx_count = 0;
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(snapshot_1, only(SNAPSHOT_ID, &count)->data, 8);
-    for (unsigned tick = 2; tick < 4u; tick++) {
-        (void)canopy_loop_cycle(&loop, 0);
-    }
-    fake.tx_count = 0;
-    (void)canopy_loop_cycle(&loop, 0);
-    (void)only(CHANGE_ID, &count);
-    TEST_ASSERT_EQUAL_UINT(0, count);
-    TEST_ASSERT_EQUAL_UINT8(0, fake.tx[0].data[6]);
-    returns[12] = CANOPY_SUCCESS;
-    fake.tx_count = 0;
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT8(2, fake.tx[0].data[6]);
-    TEST_ASSERT_EQUAL_UINT16(12, only(CHANGE_ID, &count)->data[3]);
-    TEST_ASSERT_EQUAL_HEX8(0xA2, only(CHANGE_ID, &count)->data[5]);
-}
-
-static void a_single_change_names_no_second_node(void)
-{
-    for (unsigned tick = 0; tick < 6u; tick++) {
-        (void)canopy_loop_cycle(&loop, 0);
-    }
-    sent[5] = CANOPY_IDLE;
-    fake.tx_count = 0;
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT8(1, fake.tx[0].data[6]);
-    TEST_ASSERT_EQUAL_UINT8(5, fake.tx[1].data[1]);
-    TEST_ASSERT_EQUAL_HEX8(0xFF, fake.tx[1].data[3]);
-    TEST_ASSERT_EQUAL_HEX8(0xFF, fake.tx[1].data[4]);
-    TEST_ASSERT_EQUAL_HEX8(0xFB, fake.tx[1].data[5]);
-}
-
-static void inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is(void)
-{
-    static const canopy_trace_config_t replayed = {.tick = {.id = TICK_ID},
-                                                   .inputs = {.id = INPUTS_ID, .flags = CANOPY_CAN_EXTENDED},
-                                                   .arrivals = {.id = CANOPY_TRACE_OFF},
-                                                   .change = {.id = CANOPY_TRACE_OFF},
-                                                   .snapshot = {.id = CANOPY_TRACE_OFF},
-                                                   .health = {.id = CANOPY_TRACE_OFF},
-                                                   .model = {.id = MODEL_ID},
-                                                   .health_every = 1,
-                                                   .model_every = 3};
-    static const uint8_t inputs_0[] = {0xA6, 0xA5, 0xA4, 0xA3, 0xA2, 0xA1, 200, 0xD2}; /* 0x5A, rotated */
-    static const uint8_t model_0[] = {0x21, 0x72, 0xBD, 0x14, NODES, 0, 0, 0};
-    canopy_app_t traced = app;
-    canopy_loop_config_t traced_config = config;
-    unsigned count;
-
-    traced.trace = &replayed;
-    traced_config.app = &traced;
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &traced_config));
-    bus_state.taken = 200;
-    bus_state.check = 0x5A;
-    (void)canopy_loop_cycle(&loop, UINT64_C(0xFFFFA1A2A3A4A5A6)); /* only 48 bits have room */
-    TEST_ASSERT_EQUAL_UINT(3, fake.tx_count);
-    TEST_ASSERT_EQUAL_HEX32(TICK_ID, fake.tx[0].id);
-    TEST_ASSERT_EQUAL_HEX32(INPUTS_ID, fake.tx[1].id);
-    TEST_ASSERT_EQUAL_HEX8(CANOPY_CAN_EXTENDED, fake.tx[1].flags);
-    TEST_ASSERT_EQUAL_UINT8(8, fake.tx[1].length);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(inputs_0, fake.tx[1].data, 8);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(model_0, only(MODEL_ID, &count)->data, 8);
-    TEST_ASSERT_EQUAL_UINT8(1, trace_state.sequence);
-    (void)canopy_loop_cycle(&loop, 0);
-    (void)canopy_loop_cycle(&loop, 0);
-    (void)only(MODEL_ID, &count);
-    TEST_ASSERT_EQUAL_UINT(1, count);
-    (void)canopy_loop_cycle(&loop, 0);
-    (void)only(MODEL_ID, &count);
-    TEST_ASSERT_EQUAL_UINT(2, count);
-    (void)only(INPUTS_ID, &count);
-    TEST_ASSERT_EQUAL_UINT(4, count);
-}
-
-static void lost_trace_frames_are_counted(void)
-{
-    canopy_tx_counters_t counters;
-
-    fake.tx_result = 0;
-    (void)canopy_loop_cycle(&loop, 0); /* 5 frames, and then 4: one more than there is room for */
-    (void)canopy_loop_cycle(&loop, 0);
-    canopy_tx_count(&tx, &counters);
-    TEST_ASSERT_EQUAL_UINT32(1, counters.trace_dropped);
-    TEST_ASSERT_EQUAL_UINT8(8, trace_state.sequence);
-    (void)canopy_loop_cycle(&loop,
-                            (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US); /* the 8 are too late now; 4 more wait */
-    fake.tx_result = 1;
-    (void)canopy_loop_cycle(&loop, (canopy_time_t)CANOPY_TRACE_PERIODS * PERIOD_US);
-    canopy_tx_count(&tx, &counters);
-    TEST_ASSERT_EQUAL_UINT32(9, counters.trace_dropped);
-    TEST_ASSERT_EQUAL_UINT32(fake.tx_count, counters.trace_sent);
-    TEST_ASSERT_EQUAL_UINT8(8, fake.tx[0].data[0]); /* by the sequence numbers a monitor knows how many it has missed */
-}
-
-static void the_tick_number_wraps_and_messages_go_on(void)
-{
-    unsigned count;
-
-    loop.ticks = UINT32_MAX;
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT32(0, loop.ticks);
-    fake.tx_count = 0;
-    for (unsigned tick = 0; tick < 8u; tick++) {
-        (void)canopy_loop_cycle(&loop, 0);
-    }
-    (void)only(HEALTH_ID, &count);
-    TEST_ASSERT_EQUAL_UINT(2, count);
-}
-
 static void init_refuses_an_incomplete_application(void)
 {
     canopy_app_t wrong = app;
@@ -394,7 +227,7 @@ static void init_refuses_an_incomplete_application(void)
     wrong.status = NULL;
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &wrong_config));
     wrong = app;
-    wrong.sent = NULL;
+    wrong.trace = &(const canopy_trace_config_t){.changes_max = 1};
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &wrong_config));
     wrong_config.can = NULL;
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_loop_init(&loop, &wrong_config));
@@ -410,11 +243,6 @@ int main(void)
     RUN_TEST(a_flooded_bus_cannot_hold_up_the_tick);
     RUN_TEST(a_configuration_can_take_fewer_frames_than_the_bus_carries);
     RUN_TEST(faults_are_counted_and_reported);
-    RUN_TEST(the_trace_tells_what_changed_and_sends_the_rest_later);
-    RUN_TEST(a_single_change_names_no_second_node);
-    RUN_TEST(inputs_tell_time_and_frames_taken_and_the_model_which_tree_it_is);
-    RUN_TEST(lost_trace_frames_are_counted);
-    RUN_TEST(the_tick_number_wraps_and_messages_go_on);
     RUN_TEST(init_refuses_an_incomplete_application);
     return UNITY_END();
 }

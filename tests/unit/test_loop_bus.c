@@ -11,7 +11,7 @@
 #include "small_app.h"
 #include "unity.h"
 
-enum { HEALTH_ID = 0x603, ARRIVALS_ID = 0x607, FAULTS = 8 };
+enum { FAULTS = 8 };
 
 /* In the documents and in logs of the field. */
 _Static_assert(CANOPY_FAULT_LEAF_STATUS == 1 && CANOPY_FAULT_OVERRUN == 2 && CANOPY_FAULT_CAN_RECEIVE == 3 &&
@@ -273,118 +273,6 @@ static void safe_values_go_on_until_they_are_known_to_be_out(void)
     TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.out[boxes.out_count - 1u].data[0]);
 }
 
-/* --- the trace ------------------------------------------------------------------------------------------------------ */
-
-static void expect_sent(uint32_t id, const uint8_t data[8])
-{
-    TEST_ASSERT_GREATER_THAN_UINT(0, fake.tx_count);
-    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
-        if (fake.tx[frame].id == id) {
-            TEST_ASSERT_EQUAL_HEX8_ARRAY(data, fake.tx[frame].data, 8);
-            fake.tx[frame].id = 0;
-            return;
-        }
-    }
-    TEST_FAIL_MESSAGE("no frame with this id");
-}
-
-static unsigned sent_of(uint32_t id)
-{
-    unsigned count = 0;
-
-    for (unsigned frame = 0; frame < fake.tx_count; frame++) {
-        count += fake.tx[frame].id == id ? 1u : 0u;
-    }
-    return count;
-}
-
-static void arrivals_tell_the_age_of_each_message_of_which_a_frame_was_taken(void)
-{
-    static const uint8_t one[] = {0x10, 0x03, 0x00, 0, 0, 0, 0, 0xFE};
-    static const uint8_t first[] = {0x30, 0, 0, 0, 0, 0, 0, 0xFF};
-    static const uint8_t rest[] = {0x10, 0, 0, 0, 0, 0, 0, 0xFF};
-
-    trace.arrivals.id = ARRIVALS_ID;
-    loop.ticks = 0x12FD;
-    cycle(0);
-    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID)); /* nothing to tell */
-    fake.rx[fake.rx_count++] = (canopy_can_frame_t){.time = clock_now - 2000, .id = RX_ID + 2, .length = 1};
-    cycle(0);
-    expect_sent(ARRIVALS_ID, one);
-    fake.tx_count = 0;
-    cycle(4);
-    TEST_ASSERT_EQUAL_UINT(2, sent_of(ARRIVALS_ID));
-    expect_sent(ARRIVALS_ID, first);
-    expect_sent(ARRIVALS_ID, rest);
-    fake.tx_count = 0;
-    cycle(0);
-    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID));
-}
-
-static void arrivals_of_exactly_one_frame_are_one_frame(void)
-{
-    static const uint8_t three[] = {0x30, 0, 0, 0, 0, 0, 0, 0};
-
-    trace.arrivals.id = ARRIVALS_ID;
-    cycle(3);
-    TEST_ASSERT_EQUAL_UINT(1, sent_of(ARRIVALS_ID));
-    expect_sent(ARRIVALS_ID, three);
-}
-
-static void arrivals_tell_the_state_of_the_bus_when_it_has_changed(void)
-{
-    static const uint8_t passive[] = {0x02, 0, 0, 0, 0, 0, 0, 0};
-    static const uint8_t lost_too[] = {0x0A, 0, 0, 0, 0, 0, 0, 2};
-    static const uint8_t active[] = {0x00, 0, 0, 0, 0, 0, 0, 3};
-
-    trace.arrivals.id = ARRIVALS_ID;
-    fake.controller = CANOPY_CAN_CONTROLLER_PASSIVE;
-    cycle(0);
-    expect_sent(ARRIVALS_ID, passive);
-    cycle(0);
-    TEST_ASSERT_EQUAL_UINT(0, sent_of(ARRIVALS_ID));
-    fake.rx_dropped = 1;
-    cycle(0);
-    expect_sent(ARRIVALS_ID, lost_too);
-    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
-    cycle(0);
-    expect_sent(ARRIVALS_ID, active);
-}
-
-static void arrivals_tell_that_safe_values_went_out_instead_of_the_trees(void)
-{
-    static const uint8_t down[] = {0x40 | CANOPY_CAN_DOWN, 0, 0, 0, 0, 0, 0, 0};
-    static const uint8_t back[] = {CANOPY_CAN_ERROR_ACTIVE, 0, 0, 0, 0, 0, 0, 1};
-
-    trace.arrivals.id = ARRIVALS_ID;
-    fake.controller = CANOPY_CAN_CONTROLLER_DOWN;
-    cycle(0);
-    expect_sent(ARRIVALS_ID, down);
-    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
-    cycle(0);
-    expect_sent(ARRIVALS_ID, back);
-}
-
-static void health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter(void)
-{
-    static const uint8_t open[] = {0, 0, 1, 0, 9, 0, 0, 0};
-    static const uint8_t filtered[] = {0, 0, 0xFF, 0xFF, 9, 0, 0, 0};
-
-    trace.health.id = HEALTH_ID;
-    memory.bus_state.counters.unknown_id = 1;
-    memory.tx.replaced = 2;
-    memory.tx.expired = 3;
-    loop.tx_expired = 3;
-    memory.tx.trace_late = 3;
-    memory.tx.trace_full = 1;
-    cycle(0);
-    expect_sent(HEALTH_ID, open);
-    can.is_filtered = true;
-    fake.tx_count = 0;
-    cycle(0);
-    expect_sent(HEALTH_ID, filtered);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -398,10 +286,5 @@ int main(void)
     RUN_TEST(faults_may_go_unheard);
     RUN_TEST(after_an_unusable_bus_every_messages_safe_value_is_the_first_that_leaves);
     RUN_TEST(safe_values_go_on_until_they_are_known_to_be_out);
-    RUN_TEST(arrivals_tell_the_age_of_each_message_of_which_a_frame_was_taken);
-    RUN_TEST(arrivals_of_exactly_one_frame_are_one_frame);
-    RUN_TEST(arrivals_tell_the_state_of_the_bus_when_it_has_changed);
-    RUN_TEST(arrivals_tell_that_safe_values_went_out_instead_of_the_trees);
-    RUN_TEST(health_tells_what_was_lost_on_the_way_out_and_that_there_is_a_filter);
     return UNITY_END();
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/** @file The ends of the loop's and the trace's ranges: what is missing, optional, saturated, or very late. */
+/** @file The ends of the loop's ranges: what is missing, optional, saturated, or very late. */
 #include "canopy/loop.h"
 #include "fake_can.h"
 #include "unity.h"
 
-enum { PERIOD_US = 1000 };
+enum { PERIOD_US = 1000, TRACE_ID = 0x600 };
 
 static const canopy_node_t nodes[] = {{.type = CANOPY_NODE_ALWAYS_SUCCESS, .end = 1}};
 static const canopy_tree_t tree = {.nodes = nodes, .node_count = 1};
@@ -59,15 +59,8 @@ static const canopy_bus_t bus = {
     .rx = &rx, .rx_count = 1, .tx = &tx, .tx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_bus_t mute_bus = {.rx = &rx, .rx_count = 1, .reset_output = reset_output, .set_cycle = set_cycle};
 static const canopy_bus_t silent_bus = {.reset_output = reset_output, .set_cycle = set_cycle};
-static const canopy_trace_config_t no_trace = {.tick = {.id = CANOPY_TRACE_OFF},
-                                               .change = {.id = CANOPY_TRACE_OFF},
-                                               .snapshot = {.id = CANOPY_TRACE_OFF},
-                                               .inputs = {.id = CANOPY_TRACE_OFF},
-                                               .arrivals = {.id = CANOPY_TRACE_OFF},
-                                               .health = {.id = CANOPY_TRACE_OFF},
-                                               .model = {.id = CANOPY_TRACE_OFF},
-                                               .health_every = 1,
-                                               .changes_max = 1};
+static const canopy_trace_value_t value = {.kind = CANOPY_TRACE_U8};
+static canopy_trace_config_t trace;
 
 /* A clock whose every reading and deadline the test gives. */
 static canopy_time_t readings[8];
@@ -106,7 +99,7 @@ void setUp(void)
                          .frame_us = 220,
                          .tree = &tree,
                          .bus = &bus,
-                         .trace = &no_trace,
+                         .trace = &trace,
                          .tree_instance = &instance,
                          .status = &status,
                          .bus_state = &bus_state,
@@ -116,7 +109,16 @@ void setUp(void)
                          .tx = &transmit,
                          .tx_memory = {.slots = &slot, .data = tx_data, .trace = waiting, .trace_capacity = 1},
                          .trace_state = &trace_state,
-                         .sent = &sent};
+                         .sent = &sent,
+                         .nodes_max = 1};
+    trace = (canopy_trace_config_t){.id = TRACE_ID,
+                                    .data_id = CANOPY_E2E_NONE,
+                                    .changes_max = 1,
+                                    .snapshot_every = 1,
+                                    .values_every = 1,
+                                    .health_every = 1,
+                                    .model_every = 1,
+                                    .values = &value};
     config = (canopy_loop_config_t){.app = &app, .can = &fake_can, .clock = &fake_clock};
 }
 
@@ -143,7 +145,6 @@ static void an_incomplete_configuration_is_refused(void)
     INCOMPLETE(app.period = 0);
     INCOMPLETE(app.tree = NULL);
     INCOMPLETE(app.bus = NULL);
-    INCOMPLETE(app.trace = NULL);
     INCOMPLETE(app.tree_instance = NULL);
     INCOMPLETE(app.status = NULL);
     INCOMPLETE(app.bus_state = NULL);
@@ -160,6 +161,12 @@ static void an_incomplete_configuration_is_refused(void)
     INCOMPLETE(app.frame_us = 0);
     INCOMPLETE(app.trace_state = NULL);
     INCOMPLETE(app.sent = NULL);
+    INCOMPLETE(app.nodes_max = 0);
+    INCOMPLETE(trace.value_count = 1);
+    app.trace = NULL; /* without a trace it needs none of these */
+    app.trace_state = NULL;
+    app.sent = NULL;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
 }
 
 static void a_bus_without_messages_needs_no_state_for_them(void)
@@ -339,26 +346,11 @@ static void a_very_late_start_is_in_the_last_bucket(void)
 static void counters_stay_at_their_largest_value(void)
 {
     static const canopy_can_frame_t unknown = {.id = 99, .length = 1};
-    static const canopy_trace_config_t health = {.tick = {.id = CANOPY_TRACE_OFF},
-                                                 .change = {.id = CANOPY_TRACE_OFF},
-                                                 .snapshot = {.id = CANOPY_TRACE_OFF},
-                                                 .inputs = {.id = CANOPY_TRACE_OFF},
-                                                 .arrivals = {.id = CANOPY_TRACE_OFF},
-                                                 .health = {.id = 7},
-                                                 .model = {.id = CANOPY_TRACE_OFF},
-                                                 .health_every = 1};
-
-    app.trace = &health;
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
     bus_state.counters = (canopy_bus_counters_t){.unknown_id = UINT32_MAX, .wrong_form = UINT32_MAX, .wrong_crc = 1};
-    transmit.replaced = UINT32_MAX;
-    transmit.trace_late = 1;
     canopy_bus_receive(&bus_state, &unknown, 0);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, bus_state.counters.unknown_id);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, canopy_bus_rejected(&bus_state.counters));
-    (void)canopy_loop_cycle(&loop, 0);
-    TEST_ASSERT_EQUAL_UINT(2, fake.tx_count);
-    TEST_ASSERT_EACH_EQUAL_HEX8(0xFF, fake.tx[1].data, 6); /* rejected, unknown, dropped */
 }
 
 int main(void)

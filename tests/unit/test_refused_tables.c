@@ -309,9 +309,9 @@ static void every_type_can_be_halted(void)
         uint16_t words[TABLE_WORDS];
 
         TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_init(&instance, &tree, status, words, &log));
-        status[0] = (uint8_t)CANOPY_RUNNING;
+        status[0] = canopy_status_stored(CANOPY_RUNNING);
         canopy_tree_halt(&instance);
-        TEST_ASSERT_EQUAL(CANOPY_STATUS_WAS + CANOPY_RUNNING, canopy_tree_status_code(&instance, 0));
+        TEST_ASSERT_EQUAL(CANOPY_CODE_RESET + CANOPY_RUNNING, canopy_tree_status_code(&instance, 0));
     }
     TEST_ASSERT_EQUAL_STRING("a!", log.log);
 }

@@ -149,6 +149,35 @@ static void a_less_urgent_frame_gives_up_its_mailbox(void)
     TEST_ASSERT_EQUAL_UINT32(0, counted().replaced);
 }
 
+/* The first thing that canopy_tx_post() does: what the service sees when the loop, in another thread, is just writing. */
+static void abort_while_the_loop_begins_to_write(void *context, uint8_t mailbox)
+{
+    boxes_abort(context, mailbox);
+    atomic_store(&slots[0].latest, 0u);
+}
+
+/* test_tx_threads.c meets this, too, but only by chance. */
+static void a_message_that_the_loop_is_just_writing_waits_for_the_next_service(void)
+{
+    can.abort = abort_while_the_loop_begins_to_write;
+    start(1);
+    post(1, 1, LATE);
+    canopy_tx_service(&tx, 0);
+    post(0, 1, LATE);
+    canopy_tx_service(&tx, 0); /* message 1 gives up its mailbox for message 0, which cannot be read now */
+    TEST_ASSERT_EQUAL_UINT(1, boxes.aborts);
+    TEST_ASSERT_EQUAL_HEX32(0x101, boxes.box[0].id);
+    TEST_ASSERT_EQUAL_UINT(2, boxes.offered);
+    can.abort = boxes_abort;
+    post(0, 2, LATE); /* the loop has written */
+    canopy_tx_service(&tx, 0);
+    let_all_out(0);
+    TEST_ASSERT_EQUAL_UINT(2, boxes.out_count);
+    TEST_ASSERT_EQUAL_HEX32(0x100, boxes.out[0].id);
+    TEST_ASSERT_EQUAL_UINT8(2, boxes.out[0].data[0]);
+    TEST_ASSERT_EQUAL_HEX32(0x101, boxes.out[1].id);
+}
+
 static void a_trace_frame_gives_up_its_mailbox_and_is_sent_later(void)
 {
     trace(1, LATE);
@@ -365,6 +394,7 @@ int main(void)
     RUN_TEST(the_number_of_mailboxes_that_are_used_is_bounded);
     RUN_TEST(messages_leave_in_the_order_of_their_urgency);
     RUN_TEST(a_less_urgent_frame_gives_up_its_mailbox);
+    RUN_TEST(a_message_that_the_loop_is_just_writing_waits_for_the_next_service);
     RUN_TEST(a_trace_frame_gives_up_its_mailbox_and_is_sent_later);
     RUN_TEST(a_frame_that_is_as_urgent_or_more_keeps_its_mailbox);
     RUN_TEST(without_abort_urgent_frames_have_to_wait);

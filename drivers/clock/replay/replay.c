@@ -7,11 +7,6 @@
 
 #include <stddef.h>
 
-enum { TRACE_LENGTH = 8, NOW_BYTES = 6 };
-
-/* Of CanopyArrivals' first byte. */
-enum { STATE_MASK = 7, OVERLOAD_BIT = 8, RETURNING_BIT = 0x40 };
-
 static void read_next(canopy_replay_t *self)
 {
     self->left = self->io.read(self->io.context, &self->next);
@@ -20,52 +15,15 @@ static void read_next(canopy_replay_t *self)
     }
 }
 
-static bool is_at(const canopy_replay_t *self, canopy_trace_id_t message)
-{
-    return self->left == 1 && self->next.id == message.id && self->next.flags == message.flags &&
-           self->next.length == (uint8_t)TRACE_LENGTH;
-}
-
-/** Is the next frame the beginning of a tick? */
-static bool is_at_tick(const canopy_replay_t *self)
-{
-    return is_at(self, self->inputs);
-}
-
-/** Takes what CanopyArrivals frames say of the tick and of its next frame. */
-static void read_arrivals(canopy_replay_t *self)
-{
-    while (is_at(self, self->arrivals)) {
-        const uint8_t *data = self->next.data;
-
-        self->conditions = (canopy_can_conditions_t){.can_state = data[0] & (uint8_t)STATE_MASK,
-                                                     .overload = (data[0] & (uint8_t)OVERLOAD_BIT) != 0u,
-                                                     .returning = (data[0] & (uint8_t)RETURNING_BIT) != 0u};
-        self->age = UINT64_C(1000) * ((unsigned)data[1] | ((unsigned)data[2] << 8));
-        read_next(self);
-    }
-}
-
-static canopy_time_t time_of_tick(const canopy_replay_t *self)
-{
-    canopy_time_t time = 0;
-
-    for (unsigned byte = 0; byte < (unsigned)NOW_BYTES; byte++) {
-        time |= (canopy_time_t)self->next.data[byte] << (8u * byte);
-    }
-    return time;
-}
-
 static int replay_receive(void *context, canopy_can_frame_t *frame)
 {
     canopy_replay_t *self = context;
 
-    read_arrivals(self);
-    if (self->left != 1 || is_at_tick(self)) {
+    if (self->left != 1 || self->next.is_tick) {
         return 0;
     }
-    *frame = self->next;
-    frame->time = self->now - self->age;
+    *frame = self->next.frame;
+    frame->time = self->now - UINT64_C(1000) * self->next.age;
     self->stats.received++;
     read_next(self);
     return 1;
@@ -88,9 +46,8 @@ static int replay_send(void *context, uint8_t mailbox, const canopy_can_frame_t 
 
 static void replay_conditions(void *context, canopy_can_conditions_t *conditions)
 {
-    canopy_replay_t *self = context;
+    const canopy_replay_t *self = context;
 
-    read_arrivals(self); /* those behind the last frame taken, if any */
     *conditions = self->conditions;
 }
 
@@ -113,28 +70,24 @@ static bool replay_wait_until(void *context, canopy_time_t deadline)
     canopy_replay_t *self = context;
 
     (void)deadline;
-    /* The first tick's frame is waiting since canopy_replay_init(). What a tick has left (rx_max) is not for the next. */
-    for (read_arrivals(self); self->left == 1 && !is_at_tick(self); read_arrivals(self)) {
+    /* The first tick waits since canopy_replay_init(). What a tick has left (rx_max) is not for the next. */
+    while (self->left == 1 && !self->next.is_tick) {
         self->stats.rx_dropped++;
         read_next(self);
     }
     if (self->left != 1 || self->error != CANOPY_OK) {
         return false;
     }
-    self->now = time_of_tick(self);
-    self->age = 0;
+    self->now = self->next.now;
+    self->conditions = self->next.conditions;
     read_next(self);
     return true;
 }
 
-canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_t *io,
-                                  const canopy_trace_config_t *trace)
+canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_t *io)
 {
-    if (self == NULL || io == NULL || io->read == NULL || trace == NULL) {
+    if (self == NULL || io == NULL || io->read == NULL) {
         return CANOPY_ERROR_ARGUMENT;
-    }
-    if (trace->inputs.id == CANOPY_TRACE_OFF || trace->arrivals.id == CANOPY_TRACE_OFF) {
-        return CANOPY_ERROR_UNSUPPORTED;
     }
     *self = (canopy_replay_t){.can = {.context = self,
                                       .receive = replay_receive,
@@ -144,17 +97,15 @@ canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_
                                       .mailboxes = 1,
                                       .is_filtered = true},
                               .clock = {.context = self, .now = replay_now, .wait_until = replay_wait_until},
-                              .io = *io,
-                              .inputs = trace->inputs,
-                              .arrivals = trace->arrivals};
+                              .io = *io};
     read_next(self);
     if (self->error != CANOPY_OK) {
         return self->error;
     }
-    if (!is_at_tick(self)) {
+    if (self->left != 1 || !self->next.is_tick) {
         return CANOPY_ERROR_NOT_FOUND;
     }
-    self->now = time_of_tick(self);
+    self->now = self->next.now;
     return CANOPY_OK;
 }
 

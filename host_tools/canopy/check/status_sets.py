@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from canopy.compiler.tree import Node, Script
+from canopy.compiler.blackboard import SignalName
+from canopy.compiler.tree import Bound, Node, Script
 
 Statuses = frozenset[str]
 
@@ -311,9 +312,14 @@ def leaf_statuses(node: Node) -> Statuses:
         return _given(status) | ({R} if delay else NONE)
     declared = node.leaf.returns if node.leaf is not None else ()
     result = frozenset(declared) or LEAVES.get(node.type.name, ANY)
-    if node.leaf is not None and node.leaf.reads:
+    if node.leaf is not None and (node.leaf.reads or any(_is_signal(bound) for bound in node.bound)):
         result |= {node.leaf.stale}
     return result
+
+
+def _is_signal(bound: Bound) -> bool:
+    """Does a port get a signal? Then the leaf is not called while its message is stale."""
+    return isinstance(bound.target, SignalName) and not bound.target.text.endswith(".fresh")
 
 
 def outcome(node: Node, children: Sequence[Statuses]) -> Outcome:

@@ -37,6 +37,8 @@ class Entry:
     counted: bool = False
     queue: int = 0
     is_written: bool = False
+    is_traced: bool = False
+    """A node with `_trace="yes"` has a port that it is connected to."""
 
     def connect(self, use: Use) -> None:
         """One more end."""

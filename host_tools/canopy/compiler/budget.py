@@ -13,16 +13,18 @@ from dataclasses import asdict, dataclass
 
 from canopy.compiler.bounds import Bounds, Others, make_bounds
 from canopy.compiler.bus_reader import Bus, Message
-from canopy.compiler.bus_timing import can_load_percent, trace_capacity, trace_frames
+from canopy.compiler.bus_timing import can_load_percent
 from canopy.compiler.leaf_c import entry_type, item_type
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.table import Table
+from canopy.compiler.trace import Trace
 from canopy.compiler.tree import Node
 
 # (size, alignment) on a 32-bit target with 8-byte alignment of 64-bit integers: Arm EABI and RISC-V ILP32.
 SIZES = {"bool": 1, "int8_t": 1, "uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "uint32_t": 4}
 NODE_FLASH = 12  # sizeof(canopy_node_t)
-NODE_RAM = 2  # its status, and the one that the trace sent last
+NODE_RAM = 1  # its status
+TRACED_NODE_RAM = 2  # and the one that the trace told last
 WORD_RAM = 2
 MAILBOXES_MAX = 4  # CANOPY_CAN_MAILBOXES_MAX
 SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
@@ -67,6 +69,10 @@ class Budget:
     worst_tick_leaf_calls: int
     max_depth: int
     can_load_percent: float
+    """Every cyclic message of the DBC, and the trace of a tree in which nothing changes."""
+    trace_load_percent: tuple[float, float] | None
+    """Of that the trace, and the trace when everything changes in every tick, as far as it may; None: there is none."""
+    trace_ram_bytes: int
     bitrate: int
     kinds: tuple[KindCost, ...]
     bounds: Bounds
@@ -93,14 +99,14 @@ class ImageCost:
     tables: int = 0
 
 
-def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> int:
+def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) -> int:
     """Size of the application's static object: the struct that the template application.c.j2 declares."""
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 4, *[u32] * 7, u8, u8])
-    trace_state = struct_size([pointer, u16, u8, u8])
+    bus_state = struct_size([*[pointer] * 4, *[u32] * 8, u8])
+    trace_state = struct_size([pointer, pointer, u32, u32, *[u16] * 8, *[u8] * 4])
     rx_state = struct_size([u64, *[u8] * 6, u16])
     tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
     tx_trace = struct_size([u64, u32, *[u8] * 9])
@@ -126,21 +132,28 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, changes_max: int) -> in
         [
             instance,
             bus_state,
-            trace_state,
+            *([trace_state] if trace is not None else []),
             tx,
             array(tx_slot, max(1, len(bus.send))),
-            array(tx_trace, trace_capacity(bus, changes_max)),
+            array(tx_trace, trace_capacity(trace)),
             image_in,
             image_out,
             entries_size(table),
             array(rx_state, max(1, len(bus.receive))),
             array(u16, max(1, table.words, images.words)),
-            array(u8, nodes),
-            array(u8, nodes),
+            array(u32, -(-nodes // 4)),
+            *([array(u32, -(-nodes // 4))] if trace is not None else []),
+            *([array(u32, trace.slots)] if trace is not None and trace.slots else []),
             array(u8, max(1, 2 * sum(message.length for message in bus.send))),
+            *(array(u8, len(use.nodes)) for use in table.leaves if use.leaf.reasons),
             images.memory,
         ]
     )[0]
+
+
+def trace_capacity(trace: Trace | None) -> int:
+    """Trace frames that can wait: those of one tick, rounded up to a power of two."""
+    return 1 << max(0, (trace.frames_max if trace is not None else 1) - 1).bit_length()
 
 
 def port_size(port: Port) -> tuple[int, int]:
@@ -165,7 +178,7 @@ def _ports_size(leaf: Leaf) -> int:
     return struct_size(port_size(port) for port in leaf.ports)[0] if leaf.ports else 0
 
 
-def kind_costs(table: Table) -> tuple[KindCost, ...]:
+def kind_costs(table: Table, node_ram: int) -> tuple[KindCost, ...]:
     """What each kind of node costs. Parameters, scripts and functions are shared, and not counted here."""
     first: dict[str, Node] = {}
     count: Counter[str] = Counter()
@@ -177,7 +190,7 @@ def kind_costs(table: Table) -> tuple[KindCost, ...]:
         KindCost(
             kind,
             count[kind],
-            NODE_RAM + WORD_RAM * node.type.words,
+            node_ram + WORD_RAM * node.type.words,
             NODE_FLASH + (_ports_size(node.leaf) if node.leaf is not None else 0),
         )
         for kind, node in first.items()
@@ -185,7 +198,7 @@ def kind_costs(table: Table) -> tuple[KindCost, ...]:
     return tuple(sorted(costs, key=lambda cost: (-cost.nodes * cost.flash_each, cost.kind)))
 
 
-def flash_bytes(table: Table, bus: Bus) -> int:
+def flash_bytes(table: Table, bus: Bus, trace: Trace | None) -> int:
     """Size of the constant tables: nodes, leaves, parameters, ports, messages."""
     pointer, u8, u16, u32, u64 = (scalar(t) for t in ("pointer", "uint8_t", "uint16_t", "uint32_t", "uint64_t"))
     ports = sum(_ports_size(use.leaf) * len(use.nodes) for use in table.users)
@@ -194,28 +207,36 @@ def flash_bytes(table: Table, bus: Bus) -> int:
     accepted = 4 * len(bus.receive) + 12
     tables = accepted + NODE_FLASH * len(table.rows) + 12 * table.leaf_count + 12 * len(table.controls)
     numbers = 4 * (len(table.parameters) + len(table.scripts) + len(table.bindings.texts))
-    return tables + numbers + ports + rx + tx
+    traced = 8 * trace.slots + struct_size([u32, u8, u8, u8, u32, *[u16] * 5, pointer])[0] if trace is not None else 0
+    return tables + numbers + ports + rx + tx + traced
 
 
 def make_budget(
     table: Table,
     bus: Bus,
     period_ms: int,
-    changes_max: int,
+    trace: Trace | None,
     bitrate: int,
     others: Others,
     images: ImageCost | None = None,
 ) -> Budget:
     """The whole budget. A tick visits each node at most once, so it calls each leaf once at most (semantics.md)."""
     images = images or ImageCost()
+    ram = ram_bytes(table, bus, images, trace)
+    loads = None
+    if trace is not None:
+        idle, most = (trace.load_percent(period_ms, bitrate, worst=worst) for worst in (False, True))
+        loads = (idle, most)
     return Budget(
-        ram_bytes=ram_bytes(table, bus, images, changes_max),
-        flash_bytes=flash_bytes(table, bus) + images.tables,
+        ram_bytes=ram,
+        flash_bytes=flash_bytes(table, bus, trace) + images.tables,
         nodes=len(table.rows),
         worst_tick_leaf_calls=sum(len(use.nodes) for use in table.leaves),
         max_depth=max(row.depth for row in table.rows),
-        can_load_percent=can_load_percent(bus, period_ms, changes_max, bitrate),
+        can_load_percent=round(can_load_percent(bus, bitrate) + (loads[0] if loads else 0), 2),
+        trace_load_percent=loads,
+        trace_ram_bytes=ram - ram_bytes(table, bus, images, None),
         bitrate=bitrate,
-        kinds=kind_costs(table),
-        bounds=make_bounds(bus, bitrate, others, trace_frames(bus, changes_max)),
+        kinds=kind_costs(table, TRACED_NODE_RAM if trace is not None else NODE_RAM),
+        bounds=make_bounds(bus, bitrate, others, trace.frames_max if trace is not None else 0),
     )

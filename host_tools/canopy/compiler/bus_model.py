@@ -200,8 +200,8 @@ class Message:
 class Bus:
     """The bus as `node` sees it. `load` lists (frame length, extended, fd, cycle ms) of every cyclic message on it.
 
-    `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `trace` has the node's trace
-    messages by what they are, whatever comes after that in their names. `source` is the file as it was read.
+    `node` is "" for a codec of all messages: then each is in `receive` and in `send`. `source` is the file as it was
+    read.
     """
 
     path: Path
@@ -209,7 +209,6 @@ class Bus:
     node: str
     receive: tuple[Message, ...]
     send: tuple[Message, ...]
-    trace: dict[str, Message]
     source: Dbc = field(repr=False, compare=False)
     load: tuple[tuple[int, bool, bool, float], ...] = ()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A DBC as one of its nodes sees it: what it receives, what it sends, and the trace messages of Canopy; or all of it.
+"""A DBC as one of its nodes sees it: what it receives and what it sends; or all of it.
 
 Attributes that are read (docs/dbc.md): GenMsgCycleTime, GenMsgTimeoutTime, E2EDataId of messages, GenSigInactiveValue
 of signals.
@@ -20,9 +20,9 @@ from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.limits import DATA_ID, EVERY, TIME_MS, count, whole
 from canopy.compiler.names import snake
 from canopy.compiler.signal_reader import is_safe, nearest_allowed, read_signal
-from canopy.compiler.trace_layout import TRACE_LAYOUT, check_trace, trace_kind
+from canopy.compiler.trace_layout import MESSAGES as TRACE_MESSAGES
 
-__all__ = ["TRACE_LAYOUT", "Bus", "Message", "Signal", "read_bus", "read_messages"]
+__all__ = ["Bus", "Message", "Signal", "read_bus", "read_messages"]
 
 E2E_SIGNALS = {"E2E_CRC": (0, 8), "E2E_Counter": (8, 4)}
 
@@ -122,6 +122,17 @@ def _check_every(place: Place, message: Message, period_ms: int) -> None:
     )
 
 
+def _check_no_trace(dbc: Dbc, message: Any, node: str) -> None:
+    """Until version 2 of the trace its messages stood in the DBC."""
+    if message.name.partition("_")[0] in (*TRACE_MESSAGES, "CanopyArrivals"):
+        raise CompileError(
+            dbc.text.message(message),
+            f"node '{node}' sends '{message.name}', and the trace's messages are made by the compiler",
+            "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600), or another id "
+            "that begins eight free ones",
+        )
+
+
 def _check_safe(place: Place, message: Message, signal: Signal) -> None:
     if is_safe(signal):
         return
@@ -166,7 +177,6 @@ def _make_bus(
     node: str,
     receive: list[Message],
     send: list[Message],
-    trace: dict[str, Message],
     name: str | None = None,
 ) -> Bus:
     """The bus, with C names, each its own."""
@@ -180,7 +190,6 @@ def _make_bus(
         node=node,
         receive=tuple(named[message.name] for message in receive),
         send=tuple(named[message.name] for message in send),
-        trace=trace,
         source=dbc,
     )
 
@@ -196,23 +205,11 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
     place = Place(str(path))
     dbc = load_dbc(path)
     check_node(place, dbc.database, node)
-    trace: dict[str, Message] = {}
     receive: list[Message] = []
     send: list[Message] = []
     for message in _by_id(dbc.database):
-        sent = node in message.senders
-        kind = trace_kind(message.name) if sent else None
-        if kind is not None:
-            check_trace(dbc.text.message(message), message, kind)
-            if kind in trace:
-                raise CompileError(
-                    dbc.text.message(message),
-                    f"node '{node}' sends both '{trace[kind].name}' and '{message.name}', and one {kind} is enough",
-                    "give each node that runs a tree its own",
-                )
-            trace[kind] = _read_message(dbc, message)
-            _check_every(dbc.text.attribute("GenMsgCycleTime", message), trace[kind], period_ms)
-        elif sent:
+        if node in message.senders:
+            _check_no_trace(dbc, message, node)
             send.append(_read_message(dbc, message))
         elif any(node in signal.receivers for signal in message.signals):
             receive.append(_read_message(dbc, message))
@@ -220,7 +217,7 @@ def read_bus(path: Path, node: str, period_ms: int, name: str | None = None) -> 
         _check_frame(dbc.text.message(dbc.database.get_message_by_name(message.name)), message)
     buffers = sum(2 * message.length for message in send)  # places in them: canopy_tx_message_t.place
     count(buffers, f"bytes of two buffers for each message that node '{node}' sends", place)
-    bus = dataclasses.replace(_make_bus(path, dbc, node, receive, send, trace, name), load=_load(dbc))
+    bus = dataclasses.replace(_make_bus(path, dbc, node, receive, send, name), load=_load(dbc))
     _check_outputs(dbc, bus.send, period_ms)
     return bus
 
@@ -252,4 +249,4 @@ def read_messages(path: Path, node: str = "", only: tuple[str, ...] = ()) -> Bus
                 receive.append(read)
             if sent:
                 send.append(read)
-    return _make_bus(path, dbc, node, receive, send, {})
+    return _make_bus(path, dbc, node, receive, send)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from canopy.compiler.bus_model import Bus
 
-ARRIVALS_IN_FRAME = 3  # messages that one CanopyArrivals frame tells of
 SHORTEST_FRAME_BITS = 47  # classic, 11-bit id, no data, no stuff bit, interframe space included
 
 
@@ -20,21 +19,11 @@ def frame_bits(length: int, *, extended: bool, fd: bool) -> int:
     return fixed + (8 if fd else 0) + 8 * length + (stuffed + 8 * length - 1) // 4
 
 
-def can_load_percent(bus: Bus, period_ms: int, changes_max: int, bitrate: int) -> float:
-    """Share of the bit rate that all cyclic messages of the DBC take, with a full trace in every tick."""
+def can_load_percent(bus: Bus, bitrate: int) -> float:
+    """Share of the bit rate that all cyclic messages of the DBC take."""
     per_second = sum(
         frame_bits(length, extended=extended, fd=fd) * 1000 / cycle for length, extended, fd, cycle in bus.load if cycle
     )
-    for name, frames in (
-        ("CanopyTick", 1),
-        ("CanopyInputs", 1),
-        ("CanopyArrivals", arrivals_frames(bus)),
-        ("CanopyChange", changes_max),
-        ("CanopySnapshot", 1),
-    ):
-        if name in bus.trace and bus.trace[name].cycle_ms == 0:
-            message = bus.trace[name]
-            per_second += frames * frame_bits(8, extended=message.extended, fd=False) * 1000 / period_ms
     return round(100 * per_second / bitrate, 2)
 
 
@@ -46,19 +35,3 @@ def frames_in(duration_us: int, bitrate: int) -> int:
 def frame_us(bitrate: int) -> int:
     """How long a classic frame of 8 bytes with a 29-bit id takes at most [us], rounded up."""
     return -(-frame_bits(8, extended=True, fd=False) * 1_000_000 // bitrate)
-
-
-def arrivals_frames(bus: Bus) -> int:
-    """CanopyArrivals frames of a tick that takes frames of all messages."""
-    return max(1, -(-len(bus.receive) // ARRIVALS_IN_FRAME))
-
-
-def trace_frames(bus: Bus, changes_max: int) -> int:
-    """Most trace frames of one tick."""
-    frames = {"CanopyChange": changes_max, "CanopyArrivals": arrivals_frames(bus)}
-    return sum(frames.get(kind, 1) for kind in bus.trace)
-
-
-def trace_capacity(bus: Bus, changes_max: int) -> int:
-    """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-    return 1 << max(0, trace_frames(bus, changes_max) - 1).bit_length()

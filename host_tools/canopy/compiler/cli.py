@@ -20,6 +20,7 @@ from canopy.compiler.names import is_c_identifier
 from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options, is_fixed_point
 from canopy.compiler.stubs import stubs
+from canopy.compiler.trace import Entries, Trace, TraceOptions
 from canopy.escape import c
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo
@@ -34,7 +35,15 @@ def _print_costs(budget: Budget) -> None:
         echo(f"  {cost.kind:{max(width, 12)}} {cost.nodes:6d} {cost.ram_each:9d} {cost.flash_each:11d}")
 
 
-def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int | None) -> None:
+def _print_trace(budget: Budget, trace: Trace) -> None:
+    idle, worst = budget.trace_load_percent or (0.0, 0.0)
+    values = f", {len(trace.values)} values" if trace.values else ""
+    load = f"{idle:6.2f} % of the bus while nothing changes, {worst:.2f} % at most"
+    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM")
+    echo(f"         {trace.nodes} nodes{values}, all known within {trace.known_within_ms} ms")
+
+
+def _print_budget(name: str, budget: Budget, trace: Trace | None, max_ram: int | None, max_flash: int | None) -> None:
     def limit(value: int | None) -> str:
         return f" of {value}" if value is not None else ""
 
@@ -42,7 +51,10 @@ def _print_budget(name: str, budget: Budget, max_ram: int | None, max_flash: int
     echo(f"  RAM    {budget.ram_bytes:6d}{limit(max_ram)} bytes, all of it static (32-bit target)")
     echo(f"  flash  {budget.flash_bytes:6d}{limit(max_flash)} bytes of constant tables")
     echo(f"  leaves {budget.worst_tick_leaf_calls:6d} calls in the worst tick")
-    echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, every cyclic message of the DBC")
+    what = "every cyclic message of the DBC" + (" and the trace" if trace is not None else "")
+    echo(f"  CAN    {budget.can_load_percent:6.2f} % of {budget.bitrate} bit/s, {what}")
+    if trace is not None:
+        _print_trace(budget, trace)
     _print_bounds(budget.bounds)
 
 
@@ -101,6 +113,38 @@ def type_options(command: _Command) -> _Command:
     ):
         command = option(command)
     return command
+
+
+class HexNumber(click.ParamType[int]):
+    """A number that may be written with 0x."""
+
+    name = "number"
+
+    def __init__(self, low: int, high: int) -> None:
+        self._low = low
+        self._high = high
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Raises click.BadParameter when it is none, or out of range."""
+        try:
+            number = int(str(value), 0)
+        except ValueError:
+            self.fail(f"'{value}' is no number; for example 0x600", param, ctx)
+        if not self._low <= number <= self._high:
+            self.fail(f"{value} is not between 0x{self._low:X} and 0x{self._high:X}", param, ctx)
+        return number
+
+
+def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOptions | None:
+    if base is None:
+        if guard is not None or entries != "all":
+            raise CompileError(
+                Place("--trace-guard" if guard is not None else "--trace-entries"),
+                "needs --trace",
+                "for example --trace 0x600",
+            )
+        return None
+    return TraceOptions(base, guard, entries)
 
 
 def in_range(limits: Limits) -> click.IntRange:
@@ -190,6 +234,23 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
     type=click.IntRange(0, 1_000_000),
     help="From a free mailbox to its next frame.",
 )
+@click.option(
+    "--trace",
+    "trace_base",
+    type=HexNumber(0, 0x1FFFFFF8),
+    metavar="ID",
+    help="Send the trace, with eight ids from this one on.",
+)
+@click.option(
+    "--trace-entries",
+    default="all",
+    show_default=True,
+    type=click.Choice(["all", "marked", "none"]),
+    help='Entries that the trace tells; marked: those of nodes with _trace="yes".',
+)
+@click.option(
+    "--trace-guard", type=HexNumber(0, 0xFFFF), metavar="DATA_ID", help="Protect CanopyTick by E2E Profile 11."
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -215,6 +276,9 @@ def command(
     foreign_load: int,
     foreign_burst: int,
     tx_latency_us: int,
+    trace_base: int | None,
+    trace_entries: Entries,
+    trace_guard: int | None,
     max_ram: int | None,
     max_flash: int | None,
     costs: bool,
@@ -223,19 +287,20 @@ def command(
     """Compile TREE (BehaviorTree.CPP XML, format 4) and a DBC to C.
 
     Writes NAME_app.c, NAME_app.h, NAME_leaves.h (what you write), NAME_bus.c and NAME_bus.h (the bus and its codec),
-    and NAME.model.json for the tools. Nothing is written when anything is wrong. Exit status: 0 done, 2 the input
-    cannot be compiled.
+    and NAME.model.json for the tools; with --trace also NAME_trace.dbc, for other tools. Nothing is written when
+    anything is wrong. Exit status: 0 done, 2 the input cannot be compiled.
 
     \b
     Example:
-      canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 -o build/get_home
+      canopy compile trees/get_home.xml --dbc nao.dbc --node Controller --period-ms 50 --trace 0x600 -o build/get_home
     """
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         images = _images(image_nodes, image_uses)
         others = Others(foreign_load, foreign_burst, tx_latency_us)
+        trace = _trace(trace_base, trace_guard, trace_entries)
         application = load_application(
-            name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others
+            name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others, trace
         )
         broken = refusal(application.bus, application.budget.bounds)
         if broken is not None:
@@ -260,6 +325,6 @@ def command(
     if as_json:
         echo(dumps(budget.as_dict()))
     else:
-        _print_budget(application.name, budget, max_ram, max_flash)
+        _print_budget(application.name, budget, application.trace, max_ram, max_flash)
         if costs:
             _print_costs(budget)

@@ -17,9 +17,9 @@ from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.bounds import Others
-from canopy.compiler.budget import Budget, make_budget
-from canopy.compiler.bus_reader import TRACE_LAYOUT, Bus, read_bus
-from canopy.compiler.bus_timing import frame_us, frames_in, trace_capacity
+from canopy.compiler.budget import Budget, make_budget, trace_capacity
+from canopy.compiler.bus_reader import Bus, read_bus
+from canopy.compiler.bus_timing import frame_us, frames_in
 from canopy.compiler.dbc_file import read_dbc
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.generation import PLACEHOLDER, tie
@@ -35,6 +35,7 @@ from canopy.compiler.leaf_c import (
     parameters,
     port_members,
     prototypes,
+    reason_constants,
     setter,
     stale_test,
     text_constants,
@@ -46,15 +47,14 @@ from canopy.compiler.row_c import place_constant, row_fields
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
+from canopy.compiler.trace import Trace, TraceOptions, make_trace
+from canopy.compiler.trace_layout import dbc as trace_dbc
 from canopy.compiler.tree_reader import read_tree
 from canopy.escape import c_templates
 from canopy.escape.c import header, string
 from canopy.escape.json_text import dumps
 
-MODEL_FORMAT = 1
-
-# Most CanopyChange frames in one tick: two changes each. What does not fit comes in the next tick.
-CHANGES_MAX = 8
+MODEL_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Application:
     period_ms: int
     bitrate: int
     budget: Budget
-    changes_max: int
+    trace: Trace | None
     options: Options
     images: Catalogue | None
 
@@ -89,12 +89,7 @@ class Application:
     @property
     def trace_capacity(self) -> int:
         """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-        return trace_capacity(self.bus, self.changes_max)
-
-    def every(self, name: str) -> int:
-        """The slow trace message of this name is sent in every so-many-th tick."""
-        message = self.bus.trace.get(name)
-        return max(1, message.cycle_ms // self.period_ms) if message is not None else 1
+        return trace_capacity(self.trace)
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:
@@ -132,8 +127,11 @@ def load_application(
     options: Options | None = None,
     images: tuple[int, int] | None = None,
     others: Others | None = None,
+    trace: TraceOptions | None = None,
 ) -> Application:
-    """Reads and checks everything. `images`: nodes, and uses of each kind, of the largest tree image; None: no images.
+    """Reads and checks everything.
+
+    `images`: nodes, and uses of each kind, of the largest tree image; None: no images. `trace`: None: without.
 
     Raises:
         CompileError: something in the tree, in the DBC, or between them cannot be compiled.
@@ -152,14 +150,14 @@ def load_application(
     bus = read_bus(dbc, node, period_ms, name)
     table = make_table(parsed, bind(parsed, bus, options, name))
     _check_leaves(table, bus)
-    changes_max = min(CHANGES_MAX, -(-len(table.rows) // 2))
+    traced = make_trace(table, bus, period_ms, trace) if trace is not None else None
     catalogue = None
     if images is not None:
         table = exchangeable(table)
         catalogue = Catalogue(table, make_room(table, *images))
     cost = image_cost(table, catalogue.room) if catalogue is not None else None
-    budget = make_budget(table, bus, period_ms, changes_max, bitrate, others or Others(), cost)
-    return Application(name, table, bus, period_ms, bitrate, budget, changes_max, options, catalogue)
+    budget = make_budget(table, bus, period_ms, traced, bitrate, others or Others(), cost)
+    return Application(name, table, bus, period_ms, bitrate, budget, traced, options, catalogue)
 
 
 def _category(row_category: str, kind: str) -> str:
@@ -207,7 +205,7 @@ def model(application: Application) -> dict[str, object]:
             "receive": [message.name for message in bus.receive],
             "send": [message.name for message in bus.send],
         },
-        "trace": {name: message.id for name, message in bus.trace.items()},
+        "trace": application.trace.as_dict() if application.trace is not None else None,
         "budget": application.budget.as_dict(),
         **({"image": application.images.model(application.options)} if application.images is not None else {}),
     }
@@ -253,9 +251,9 @@ def environment(bus: Bus) -> jinja2.Environment:
         "entry_note": entry_note,
         "item_type": item_type,
         "text_constants": text_constants,
+        "reason_constants": reason_constants,
         "place_constant": place_constant,
         "row_fields": row_fields,
-        "TRACE": list(TRACE_LAYOUT),
         "version": __version__,
         "generation": PLACEHOLDER,
     }
@@ -288,6 +286,7 @@ def render(application: Application) -> dict[str, bytes]:
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
         "image": application.images,
+        "trace": application.trace,
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],
     }
     name = application.name
@@ -301,7 +300,13 @@ def render(application: Application) -> dict[str, bytes]:
         file: layout(environment(application.bus).get_template(template).render(context))
         for file, template in templates.items()
     }
+    traced = application.trace
     return {
+        **(
+            {f"{name}_trace.dbc": trace_dbc(traced.base, traced.extended, application.bus.node).encode()}
+            if traced
+            else {}
+        ),
         application.bus.path.name: read_dbc(application.bus.path),
         f"{name}.model.json": (dumps(model(application), indent=1) + "\n").encode(),
         **tie(files),

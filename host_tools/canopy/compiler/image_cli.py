@@ -13,7 +13,7 @@ from canopy.compiler.dbc_file import read_dbc
 from canopy.compiler.emit import Application, load_application, model
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image import SOURCES, Image, ImageError, make_image, read_image
-from canopy.compiler.image_model import read_firmware
+from canopy.compiler.image_model import image_trace, read_firmware
 from canopy.compiler.node_types import node_types
 from canopy.compiler.output import dependencies, fail, write_or_exit
 from canopy.compiler.port_types import Options
@@ -24,8 +24,7 @@ from canopy.files import FileError
 BITRATE = 500_000  # of no account for an image
 
 
-def _compile(tree: Path, firmware: Path) -> tuple[Application, bytes]:
-    data = read_firmware(firmware)
+def _compile(tree: Path, firmware: Path, data: dict[str, Any]) -> tuple[Application, bytes]:
     bus, types = data["bus"], data["image"]["types"]
     options = Options(types["floating_point"], types["map"], types.get("include"), unset_ports=types["unset_ports"])
     name, period_ms = data["application"], data["period_us"] // 1000
@@ -62,12 +61,14 @@ def build(tree: Path, firmware: Path, output: Path, with_model: bool, depfile: P
     Exit status: 0 done, 2 the tree cannot be compiled for this firmware; then nothing is written.
     """
     try:
-        application, image = _compile(tree, firmware)
+        data = read_firmware(firmware)
+        application, image = _compile(tree, firmware, data)
         dbc = application.bus.path
         files: dict[str, bytes] = {}
         if with_model:
             files[dbc.name] = read_dbc(dbc)
-            files[f"{output.stem}.model.json"] = (dumps(model(application), indent=1) + "\n").encode()
+            content = model(application) | {"trace": image_trace(data, application.table)}
+            files[f"{output.stem}.model.json"] = (dumps(content, indent=1) + "\n").encode()
         read = [*application.table.tree.files, firmware, dbc]
         first = dependencies(depfile, output, read) if depfile is not None else {}
     except CompileError as error:

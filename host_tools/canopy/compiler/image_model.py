@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from canopy.compiler.emit import MODEL_FORMAT
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import IMAGE_NODES, IMAGE_TEXTS, IMAGE_USES
 from canopy.compiler.limits import COUNT, PERIOD_MS, Limits, whole
+from canopy.compiler.table import Table
+from canopy.compiler.trace import known_within_ms
 from canopy.files import FileError, read_text
 
 BUILD_AGAIN = "build the firmware again"
@@ -88,3 +91,38 @@ def read_firmware(path: Path) -> dict[str, Any]:
         whole(_field(data, name, int, place), limits, name, place, BUILD_AGAIN)
     _check_items(data["image"], place)
     return data
+
+
+def image_trace(data: dict[str, Any], table: Table) -> dict[str, Any] | None:
+    """The member "trace" of an image's own model file: the firmware's, with the reasons of the image's leaves.
+
+    A firmware has room for the reasons of so many uses of a leaf as its own tree has, in their order.
+
+    Raises:
+        CompileError: the firmware's model file has something else there.
+    """
+    trace = data.get("trace")
+    if trace is None:
+        return None
+    uses = {use.leaf.id: [id(node) for node in use.nodes] for use in table.users}
+    places = {id(row.node): index for index, row in enumerate(table.rows)}
+    seen: Counter[str] = Counter()
+    values = []
+    try:
+        for value in trace["values"]:
+            if value["kind"] == "reason":
+                leaf = data["tree"]["nodes"][value["node"]]["type"]
+                nodes, number = uses.get(leaf, []), seen[leaf]
+                seen[leaf] += 1
+                if number >= len(nodes):
+                    continue
+                row = table.rows[places[nodes[number]]]
+                value = {**value, "name": row.node.name, "path": row.node.path, "node": places[nodes[number]]}
+            values.append(value)
+        slots = sum(value["slots"] for value in values)
+        known = known_within_ms(
+            data["period_us"] // 1000, len(table.rows), trace["snapshot_every"], slots, trace["values_every"]
+        )
+    except (KeyError, IndexError, TypeError) as error:
+        raise CompileError(Place("trace"), f"the firmware's model file is wrong at {error}", BUILD_AGAIN) from error
+    return {**trace, "values": values, "known_within_ms": known}

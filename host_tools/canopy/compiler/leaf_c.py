@@ -41,6 +41,8 @@ def parameters(leaf: Leaf, bus: Bus, before: str = "") -> str:
         parts.append(f"const {leaf.c_name}_ports_t *ports")
     if leaf.state:
         parts.append(f"{leaf.state} *self")
+    if leaf.reasons:
+        parts.append(f"{leaf.c_name}_reason_t *reason")
     return ", ".join(parts)
 
 
@@ -55,7 +57,16 @@ def arguments(leaf: Leaf, *, copies: bool = False, before: str = "") -> str:
         parts.append("&ports" if copies else f"&{leaf.c_name}_ports[parameter]")
     if leaf.state:
         parts.append(f"&app->{leaf.c_name}[parameter]")
+    if leaf.reasons:
+        parts.append(f"&app->reason_of_{leaf.c_name}[parameter]")
     return ", ".join(parts)
+
+
+@emits_c
+def reason_constants(leaf: Leaf) -> list[tuple[str, int]]:
+    """The C names of the leaf's reasons, and their numbers; 0 is none."""
+    stem = leaf.c_name.upper()
+    return [(f"{stem}_REASON_{snake(name).upper()}", number) for number, name in enumerate(("none", *leaf.reasons))]
 
 
 @emits_c

@@ -11,7 +11,8 @@
 Metadata: `kind` (SyncAction or StatefulAction; an <Action> is a StatefulAction unless it says so), `reads` and `writes`
 (messages of the DBC, separated by spaces), `stale` (what the leaf returns while a message it reads is not fresh:
 FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's own state), `texts` (what the node may
-write to its output ports of texts, separated by semicolons: texts are constants).
+write to its output ports of texts, separated by semicolons: texts are constants), `reasons` (of a Condition or Action:
+why it returns what it returns, names of the user's separated by semicolons; the trace tells them).
 
 <Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
 
@@ -30,12 +31,13 @@ from functools import cached_property
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
-from canopy.compiler.limits import PORTS_MAX
+from canopy.compiler.limits import PORTS_MAX, REASONS_MAX
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType, read_type
 from canopy.compiler.xml_reader import Element
 
 METADATA = (
+    "reasons",
     "kind",
     "reads",
     "writes",
@@ -104,6 +106,7 @@ class Leaf:
     stale: str = "FAILURE"
     state: str | None = None
     texts: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
     returns: tuple[str, ...] = ()
     undoes: tuple[str, ...] = ()
     achieves: tuple[str, ...] = ()
@@ -200,6 +203,23 @@ def _texts(draft: _Draft, leaf_id: str) -> tuple[str, ...]:
     return texts
 
 
+def _reasons(draft: _Draft, leaf_id: str, kind: str) -> tuple[str, ...]:
+    text, place = draft.metadata.get("reasons", ("", Place("")))
+    reasons = tuple(part.strip() for part in text.split(";") if part.strip())
+    names = Counter(map(snake, reasons))
+    for part in reasons:
+        name = snake(part)
+        if not name.strip("_") or names[name] > 1 or name == "none":
+            raise CompileError(place, f"reasons of '{leaf_id}': '{part}' gives no C name of its own, but '{name}'")
+    if reasons and kind in INNER_KINDS:
+        raise CompileError(place, f"'{leaf_id}' is a {kind}, and only conditions and actions have reasons")
+    if len(reasons) > REASONS_MAX:
+        raise CompileError(
+            place, f"'{leaf_id}' has {len(reasons)} reasons", f"{REASONS_MAX} at most: they are one byte"
+        )
+    return reasons
+
+
 def _returns(draft: _Draft, kind: str) -> tuple[str, ...]:
     allowed = RETURNS.get(kind, ("RUNNING", *COMPLETED))
     for status in _words(draft, "returns"):
@@ -268,6 +288,7 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
         stale=_one_of(draft, "stale", STALE, "FAILURE"),
         state=state,
         texts=_texts(draft, leaf_id),
+        reasons=_reasons(draft, leaf_id, kind),
         returns=_returns(draft, kind),
         undoes=_words(draft, "undoes"),
         achieves=_words(draft, "achieves"),

@@ -30,7 +30,7 @@ class Limits:
 COUNT = Limits(0, 0xFFFF)
 """uint16_t: how many there are of something in the tables."""
 EVERY = Limits(1, 0xFFFF, "ticks")
-"""canopy_tx_message_t.every, canopy_trace_config_t.health_every and .model_every."""
+"""canopy_tx_message_t.every, canopy_trace_config_t.snapshot_every and so on."""
 TIME_MS = Limits(0, 2**32 - 1, "ms")
 """Cycle times and timeouts: uint32_t in ms, 49 days."""
 PERIOD_MS = Limits(1, 3_600_000, "ms")
@@ -45,6 +45,8 @@ BITRATE = Limits(1_000, 100_000_000, "bit/s")
 
 PORTS_MAX = 1_000
 """Of one node type: a member of a struct each, in three places."""
+REASONS_MAX = 255
+"""Of one leaf: a byte, and 0 is none."""
 
 
 def _exactly(value: int | float | Decimal | Fraction | str) -> Fraction | None:

@@ -116,7 +116,7 @@ class Bodies:
         return [
             f"static const {c_type} items[] = {{{', '.join(items)}}};",
             "",
-            f"if (app->status[{self._indices[id(script.node)]}] != (uint8_t)CANOPY_RUNNING) {{",
+            f"if (!canopy_status_runs(app->tree.status[{self._indices[id(script.node)]}])) {{",
             f"    {state} = 0;",
             "}",
             f"if ({state} == {len(items)}u) {{",

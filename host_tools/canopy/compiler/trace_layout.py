@@ -1,65 +1,131 @@
 # SPDX-License-Identifier: MIT
-"""The layout of the trace's messages, which the DBC has to describe as it is."""
+"""The layout of the trace's messages (docs/trace.md), and the DBC that tells it to other tools.
+
+The runtime's trace files write these bits, and `canopy.trace` reads them.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.names import is_c_identifier
 
-# Layout of the trace's messages: signal -> (start bit, length), all little-endian and unsigned. The runtime's trace.c
-# writes these bits; the DBC must say the same, so that other tools read them right.
-TRACE_LAYOUT: dict[str, dict[str, tuple[int, int]]] = {
-    "CanopyTick": {
-        "Sequence": (0, 8),
-        "Tick": (8, 32),
-        "RootStatus": (40, 4),
-        "Tree": (44, 4),
-        "Changes": (48, 8),
-        "Overruns": (56, 8),
-    },
-    "CanopyInputs": {"Now": (0, 48), "Taken": (48, 8), "Check": (56, 8)},
-    "CanopyArrivals": {
-        "CanState": (0, 3),
-        "Overload": (3, 1),
-        "Count": (4, 2),
-        "Returning": (6, 1),
-        "Age0": (8, 16),
-        "Age1": (24, 16),
-        "Age2": (40, 16),
-        "Tick": (56, 8),
-    },
-    "CanopyChange": {
-        "Sequence": (0, 8),
-        "NodeA": (8, 16),
-        "NodeB": (24, 16),
-        "StatusA": (40, 4),
-        "StatusB": (44, 4),
-        "Tree": (48, 4),
-    },
-    "CanopySnapshot": {
-        "Sequence": (0, 8),
-        "First": (8, 16),
-        **{f"Status{place}": (24 + 4 * place, 4) for place in range(10)},
-    },
-    "CanopyHealth": {"RxRejected": (0, 16), "RxUnknown": (16, 16), "TxDropped": (32, 16), "Faults": (48, 16)},
-    "CanopyModel": {"Hash": (0, 32), "Nodes": (32, 16)},
+VERSION = 2
+"""CANOPY_TRACE_VERSION."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A signal of a trace message, little-endian and unsigned. `page`: of a message with pages, the one that has it."""
+
+    name: str
+    start: int
+    length: int
+    unit: str = ""
+    factor: int = 1
+    page: int | None = None
+
+
+def _fields(*rows: tuple[str, int, int]) -> tuple[Field, ...]:
+    return tuple(Field(*row) for row in rows)
+
+
+def _counters(page: int, *rows: tuple[str, int, int]) -> tuple[Field, ...]:
+    return tuple(Field(name, start, length, page=page) for name, start, length in rows)
+
+
+MESSAGES: dict[str, tuple[Field, ...]] = {
+    "CanopyTick": _fields(
+        ("Crc", 0, 8),
+        ("Counter", 8, 4),
+        ("Version", 12, 4),
+        ("Tick", 16, 32),
+        ("Sequence", 48, 6),
+        ("HasSnapshot", 54, 1),
+        ("HasChanges", 55, 1),
+        ("RootStatus", 56, 3),
+        ("Values", 59, 3),
+        ("Overruns", 62, 2),
+    ),
+    "CanopyInputs": (
+        Field("Now", 0, 24, "us"),
+        *_fields(
+            ("Taken", 24, 8),
+            ("Check", 32, 8),
+            ("CanState", 40, 3),
+            ("Overload", 43, 1),
+            ("Returning", 44, 1),
+            ("Ages", 45, 2),
+            ("Many", 47, 1),
+            ("Age0", 48, 8),
+            ("Age1", 56, 8),
+        ),
+    ),
+    "CanopyArrivals": _fields(
+        ("Tick", 0, 4), ("Bytes", 4, 3), ("Last", 7, 1), *((f"Age{place}", 8 + 8 * place, 8) for place in range(7))
+    ),
+    "CanopySnapshot": _fields(
+        ("Sequence", 0, 6),
+        ("Part", 8, 13),
+        ("Tick", 21, 3),
+        *((f"Status{place}", 24 + 4 * place, 4) for place in range(10)),
+    ),
+    "CanopyChange": _fields(
+        ("Sequence", 0, 6),
+        ("More", 6, 2),
+        ("Block", 8, 12),
+        ("Tick", 20, 4),
+        *(
+            row
+            for place in range(5)
+            for row in ((f"Code{place}", 24 + 8 * place, 4), (f"Gap{place}", 28 + 8 * place, 4))
+        ),
+    ),
+    "CanopyValue": _fields(("Slot", 0, 12), ("Tick", 12, 4), ("More", 16, 1), ("Value", 32, 32)),
+    "CanopyHealth": (
+        *_fields(("Page", 0, 4)),
+        *_counters(0, ("Filtered", 4, 1), ("RxRejected", 8, 16), ("RxUnknown", 24, 16), ("RxLost", 40, 16)),
+        *_counters(0, ("RxBacklogs", 56, 8)),
+        *_counters(1, ("TxReplaced", 8, 16), ("TxExpired", 24, 16), ("TraceDropped", 40, 16), ("Restarts", 56, 8)),
+        *_counters(2, ("Overruns", 8, 16)),
+        Field("LongestCycle", 24, 24, "us", page=2),
+        Field("LatestStart", 48, 16, "us", 10, page=2),
+        *_counters(3, *((f"Late{place}", 8 + 4 * place, 4) for place in range(12)), ("Slips", 56, 8)),
+        *_counters(4, ("LeafFaults", 8, 16), ("RxErrors", 24, 16), ("Timeouts", 40, 16)),
+    ),
+    "CanopyModel": (
+        *_fields(("Page", 0, 4), ("Version", 4, 4)),
+        *_counters(0, ("Hash", 8, 32), ("Nodes", 40, 16)),
+        *_counters(1, ("TickLow", 8, 16)),
+        Field("NowUpper", 24, 24, page=1),
+    ),
 }
+"""In the order of their arbitration ids."""
+
+IDS = {message: offset for offset, message in enumerate(MESSAGES)}
+"""Message -> what its arbitration id is above CanopyTick's."""
 
 
-def trace_kind(name: str) -> str | None:
-    """Which trace message a message of the DBC is by its name: `CanopyTick`, or `CanopyTick_` and any more.
+def _lines(base: int, extended: bool, node: str) -> Iterator[str]:
+    sender = node if is_c_identifier(node) else "Controller"
+    yield 'VERSION ""'
+    yield "NS_ :"
+    yield "BS_:"
+    yield f"BU_: {sender}"
+    for message, fields in MESSAGES.items():
+        yield ""
+        yield f"BO_ {base + IDS[message] + (0x80000000 if extended else 0)} {message}: 8 {sender}"
+        paged = any(field.page is not None for field in fields)
+        for field in fields:
+            page = "" if field.page is None else f" m{field.page}"
+            page = " M" if paged and field.name == "Page" else page
+            yield (
+                f' SG_ {field.name}{page} : {field.start}|{field.length}@1+ ({field.factor},0) [0|0] "{field.unit}" '
+                "Vector__XXX"
+            )
 
-    Names are unique in a DBC, and each node that runs a tree has trace messages of its own.
-    """
-    kind = name.partition("_")[0]
-    return kind if kind in TRACE_LAYOUT else None
 
-
-def check_trace(place: Place, message: Any, kind: str) -> None:
-    """Raises CompileError when a message of the DBC has another layout than the trace message that its name says."""
-    layout = {s.name: (s.start, s.length) for s in message.signals if s.byte_order == "little_endian"}
-    wanted = TRACE_LAYOUT[kind]
-    if message.length != 8 or layout != wanted or any(s.is_signed for s in message.signals):
-        rows = ", ".join(f"{name} {start}|{length}@1+" for name, (start, length) in wanted.items())
-        raise CompileError(place, f"message '{message.name}' must have 8 bytes and these signals: {rows}")
+def dbc(base: int, extended: bool, node: str) -> str:
+    """A DBC of the trace of one controller, for cantools, candump's decoders and other tools."""
+    return "\n".join(_lines(base, extended, node)) + "\n"

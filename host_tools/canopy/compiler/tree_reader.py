@@ -27,7 +27,7 @@ MAX_SUBTREE_DEPTH = 1_000
 MAX_PATH = 4_000
 
 # Attributes that any node may have and that change nothing in a tick.
-PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath")
+PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath", "_trace")
 CONDITION_ATTRIBUTES = (*PRECONDITIONS, *POSTCONDITIONS)
 
 # Kinds of the user's own nodes: their names in XML are those of the nodes.
@@ -262,8 +262,19 @@ class _Builder:
             raise leaf.problem
         self._check_attributes(element, {port.name for port in leaf.ports})
         bound = tuple(self._bind(element, leaf, port, scope) for port in leaf.ports)
+        if self._is_traced(element):
+            for port in bound:
+                if isinstance(port.target, Entry):
+                    port.target.is_traced = True
         name = element.attributes.get("name", leaf.id)
         return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
+
+    @staticmethod
+    def _is_traced(element: Element) -> bool:
+        text = element.attributes.get("_trace", "no")
+        if text not in ("yes", "no"):
+            raise CompileError(element.attribute_place("_trace"), f"_trace='{text}' is neither yes nor no")
+        return text == "yes"
 
     def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
         # Groot2 writes an empty attribute for a port that nothing is connected to.

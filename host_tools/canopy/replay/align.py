@@ -121,13 +121,14 @@ def not_counted(lacking: Sequence[Lacking], counted: Sequence[tuple[int, int]], 
 
     Args:
         lacking: In any order.
-        counted: Tick and TxDropped of every CanopyHealth. The last one must count all, whenever they are due.
-        saturated: A TxDropped that may be any larger number.
+        counted: Tick and number of every CanopyHealth that tells it. What is due behind the last one nothing counts;
+            where there is none at all, nothing may lack.
+        saturated: A number that may be any larger one.
     """
     ordered = sorted(lacking, key=lambda one: one.frame.order)
     found: list[list[Lacking]] = []
-    if not counted or counted[-1][1] < saturated:
-        found.append(ordered[counted[-1][1] if counted else 0 :])
+    if not counted:
+        found.append(ordered)
     for tick, dropped in counted:
         if dropped < saturated:
             found.append([one for one in ordered if one.due <= tick][dropped:])

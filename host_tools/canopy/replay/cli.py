@@ -103,7 +103,7 @@ def replay(log: Path, model: Model, options: Options) -> Replayed:
     bus = Bus(model)
     with tempfile.TemporaryDirectory(prefix="canopy-replay-") as temporary:
         record, sent = options.keep or Path(temporary) / "record", Path(temporary) / "sent"
-        write_record(record, bus, run, inputs)
+        write_record(record, run, inputs)
         run_program(options.program, options.arguments, record.absolute(), sent)
         result = Comparison(bus, run, inputs.ticks).run(read_sent(sent))
     return Replayed(options.run or 1, len(recording.runs), len(inputs), inputs.reordered, inputs.unheard, result)
@@ -117,7 +117,9 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
     if not result.differences:
         dropped = f"; {result.dropped} more did not leave, as CanopyHealth has counted" if result.dropped else ""
         unheard = f"; {replayed.unheard} never reached the controller" if replayed.unheard else ""
-        echo(f"{name}: {result.ticks} ticks replayed, {result.frames} frames compared: all equal{dropped}{unheard}")
+        uncounted = f"; {result.uncounted} are missing behind the last count of such" if result.uncounted else ""
+        equal = f"{result.ticks} ticks replayed, {result.frames} frames compared: all equal"
+        echo(f"{name}: {equal}{dropped}{uncounted}{unheard}")
         return
     for difference in result.differences[:_SHOWN]:
         echo(f"{name}: {difference.text()}")

@@ -17,14 +17,16 @@ import can
 from canopy.replay import e2e
 from canopy.replay.align import Alignment, Lacking, Replayed, Rules, Same, align, not_counted
 from canopy.replay.explain import explain
-from canopy.replay.log import AHEAD, NEEDED, Bus, Run, Sent, key
+from canopy.replay.log import AHEAD, COUNTED_MAX, NEEDED, Bus, Run, Sent, key
 
-NOT_COMPARED = {"CanopyTick": bytes([0] * 7 + [0xFF]), "CanopyHealth": bytes([0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0])}
-"""Bits that do not follow from the inputs: Overruns; RxUnknown and TxDropped."""
+_OVERRUNS, _PROTECTED_OVERRUNS = bytes([*[0] * 7, 0xC0]), bytes([0xFF, *[0] * 6, 0xC0])
+_NO_COUNTS = bytes([0, *[0xFF] * 7])
+_HEALTH = {0: bytes([0x10, 0, 0, *[0xFF] * 5]), 4: bytes([0, 0, 0, 0xFF, 0xFF, 0, 0, 0xFF])}
+"""Bits that follow from clock, driver and bus, not from the inputs. Of CanopyTick Overruns, and the CRC over them; of
+CanopyHealth all but RxRejected in page 0, LeafFaults and Timeouts in page 4."""
 _COUNTED_AFTER = AHEAD + 1
 """Ticks from the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
 of a tick leaves, all commands of the tick have left or were counted."""
-_SATURATED = 0xFFFF
 _LAST = 1 << 62
 """In the order of the replay's frames: behind all."""
 
@@ -58,12 +60,21 @@ class Result:
     """Frames compared."""
     dropped: int = 0
     """Frames of these ticks that the log lacks, and that CanopyHealth counts as not sent."""
+    uncounted: int = 0
+    """Frames of these ticks that the log lacks so late that no CanopyHealth in it could count them."""
     differences: list[Difference] = field(default_factory=list)
     """Of the first tick that is not equal."""
 
     def as_dict(self) -> dict[str, object]:
         """For JSON."""
         return asdict(self)
+
+
+def _are_same(recorded: bytes, replayed: bytes, mask: bytes) -> bool:
+    """All bits but those of the mask."""
+    return len(recorded) == len(replayed) and all(
+        (was ^ now) & ~unlike & 0xFF == 0 for was, now, unlike in zip(recorded, replayed, mask, strict=True)
+    )
 
 
 class Comparison:
@@ -76,6 +87,7 @@ class Comparison:
         self._whole = ticks - 1 if run.gap is None and ticks == len(run.ticks) else ticks
         """Of so many ticks the log has everything: it may end within the last one."""
         self._counted = run.counted
+        self._guard = bus.model.trace.guard
         self._found: list[tuple[int, Difference]] = []
         """With its place in the replay."""
 
@@ -89,7 +101,7 @@ class Comparison:
         for number, alignment in alignments.items():
             self._judge(number, alignment, done)
             lacking += self._lacking(number, alignment, replayed[number])
-        for one in not_counted(lacking, self._counted, _SATURATED):
+        for one in not_counted(lacking, self._counted, COUNTED_MAX):
             self._differ_lacking(one.message, one.frame)
         return self._sum_up(done, alignments)
 
@@ -101,6 +113,9 @@ class Comparison:
             compared = alignment.pairs + alignment.other
             result.frames += sum(frame.tick <= min(last, self._ticks - 1) for _, frame in compared)
             result.dropped += sum(frame.tick < min(last, self._whole) for frame in alignment.lacking)
+        if self._counted:
+            result.uncounted = max(0, result.dropped - self._counted[-1][1])
+            result.dropped -= result.uncounted
         self._found.sort(key=lambda found: found[0])
         result.differences = [difference for _, difference in self._found if difference.tick == first]
         return result
@@ -122,7 +137,9 @@ class Comparison:
     def _align(self, number: int, replayed: Sequence[Replayed]) -> Alignment:
         may_lack = 0 if self._is_needed(number) else max((count for _, count in self._counted), default=0)
         ahead = 0 if number in self._bus.trace else AHEAD
-        rules = Rules(ahead, may_lack, self._whole, self._same(number))
+        # Behind the last CanopyHealth nothing counts what is lacking.
+        whole = min(self._whole, self._counted[-1][0] - _COUNTED_AFTER) if self._counted else self._whole
+        rules = Rules(ahead, may_lack, self._whole if self._is_needed(number) else whole, self._same(number))
         recorded = self._run.sent.get(number, [])
         found = (align(recorded[start:], replayed, rules) for start in self._starts(number, recorded))
         return min(found, key=Alignment.cost)
@@ -138,14 +155,13 @@ class Comparison:
     def _same(self, number: int) -> Same:
         if number in self._bus.protected:
             return lambda recorded, replayed: e2e.without(recorded) == e2e.without(replayed)
-        mask = NOT_COMPARED.get(self._bus.trace.get(number, ""))
-        if mask is None:
-            return bytes.__eq__
-        bits = int.from_bytes(mask, "little")
-        return lambda recorded, replayed: (
-            len(recorded) == len(replayed)
-            and (int.from_bytes(recorded, "little") ^ int.from_bytes(replayed, "little")) & ~bits == 0
-        )
+        kind = self._bus.trace.get(number, "")
+        if kind == "CanopyHealth":
+            return lambda recorded, replayed: _are_same(recorded, replayed, _HEALTH.get(replayed[0] & 15, _NO_COUNTS))
+        if kind == "CanopyTick":
+            mask = _OVERRUNS if self._guard is None else _PROTECTED_OVERRUNS
+            return lambda recorded, replayed: _are_same(recorded, replayed, mask)
+        return bytes.__eq__
 
     def _judge(self, number: int, alignment: Alignment, done: int) -> None:
         """Adds the differences that one message shows by itself."""
@@ -165,6 +181,17 @@ class Comparison:
                     self._differ_lacking(number, frame)
         if number in self._bus.protected:
             self._judge_e2e(number, alignment.pairs)
+        if name == "CanopyTick" and self._guard is not None:
+            self._judge_guard(self._guard, alignment.pairs)
+
+    def _judge_guard(self, data_id: int, pairs: Sequence[tuple[Sent, Replayed]]) -> None:
+        """The first CanopyTick of the log whose CRC is wrong is a difference."""
+        for sent, frame in pairs:
+            right = e2e.crc(data_id, sent.data)
+            if sent.data[0] != right:
+                what = ("Crc", str(sent.data[0]), str(right))
+                self._differ(frame.tick, frame.order, "CanopyTick", what, sent.place)
+                return
 
     def _judge_e2e(self, number: int, pairs: Sequence[tuple[Sent, Replayed]]) -> None:
         """The first frame of the log whose counter does not follow, or whose CRC is wrong, is a difference."""

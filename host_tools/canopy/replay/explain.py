@@ -5,12 +5,9 @@ from __future__ import annotations
 
 from cantools.database.can import Message as DbcMessage
 
+from canopy.live.codes import NO_CODE, code_name
+from canopy.live.frames import ChangeFrame, SnapshotFrame, ValueFrame
 from canopy.replay.log import Bus
-from canopy.trace import status_name
-
-_SNAPSHOT_NODES = 10
-_NO_NODE = 0xFFFF
-_NO_STATUS = 15
 
 
 def explain(bus: Bus, message: int, recorded: bytes, replayed: bytes) -> list[tuple[str, str, str]]:
@@ -26,6 +23,8 @@ def explain(bus: Bus, message: int, recorded: bytes, replayed: bytes) -> list[tu
     if kind in ("CanopyChange", "CanopySnapshot"):
         read = _changes if kind == "CanopyChange" else _snapshot
         return _explain_nodes(bus, read(recorded), read(replayed))
+    if kind == "CanopyValue":
+        return _explain_values(bus, ValueFrame.read(recorded), ValueFrame.read(replayed))
     was, now = _decode(bus.sent[message], recorded), _decode(bus.sent[message], replayed)
     names = [name for name in was if was[name] != now.get(name)]
     values = [name for name in names if not name.startswith("E2E_")] or names
@@ -56,22 +55,20 @@ def _decode(message: DbcMessage, data: bytes) -> dict[str, str]:
     }
 
 
-def _status(code: int) -> str:
-    try:
-        return status_name(code)
-    except ValueError:
-        return f"code {code}"
-
-
 def _changes(data: bytes) -> dict[int, str]:
-    pairs = (
-        (int.from_bytes(data[1:3], "little"), data[5] & 15),
-        (int.from_bytes(data[3:5], "little"), data[5] >> 4),
-    )
-    return {node: _status(code) for node, code in pairs if node != _NO_NODE}
+    frame = ChangeFrame.read(data)
+    return dict(zip(frame.nodes, map(code_name, frame.codes), strict=True)) if frame is not None else {}
 
 
 def _snapshot(data: bytes) -> dict[int, str]:
-    first = int.from_bytes(data[1:3], "little")
-    codes = [(byte >> shift) & 15 for byte in data[3:] for shift in (0, 4)]
-    return {first + place: _status(code) for place, code in enumerate(codes) if code != _NO_STATUS}
+    frame = SnapshotFrame.read(data)
+    return {frame.first + place: code_name(code) for place, code in enumerate(frame.codes) if code != NO_CODE}
+
+
+def _explain_values(bus: Bus, was: ValueFrame, now: ValueFrame) -> list[tuple[str, str, str]]:
+    names = {
+        slot: value.title for value in bus.model.trace.values for slot in range(value.slot, value.slot + value.slots)
+    }
+    if was.slot == now.slot and was.bits != now.bits:
+        return [(f"value '{names.get(was.slot, was.slot)}'", f"0x{was.bits:X}", f"0x{now.bits:X}")]
+    return [("value", f"'{names.get(was.slot, was.slot)}'", f"'{names.get(now.slot, now.slot)}'")]

@@ -8,10 +8,10 @@ the checks of the first ticks fit at one place only, unless the frames before it
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from canopy.replay.log import LogError, Recording, Run, Taken
-from canopy.replay.ticks import CHECKED_CONDITIONS, Tick, next_check
+from canopy.replay.ticks import Tick, next_check
 
 _AHEAD = 64
 """On a unixbus a frame may reach the log that much later than the controller's answer to it."""
@@ -23,9 +23,6 @@ _STARTS_MENDED = 16
 _LOST_MAX = 255
 _STEPS_LATER = 8
 _TICKS_CUT = 2
-_TAKEN_WRAPS = 256
-_FRAMES_MAX = 8 * _TAKEN_WRAPS
-"""In one tick. Taken tells only their number modulo 256."""
 
 
 @dataclass(frozen=True)
@@ -149,12 +146,9 @@ class Inputs:
         return len(self._steps)
 
     def _is_cut(self, index: int, place: int) -> bool:
-        """Does the log end before these frames, or their ages, and the run soon after? Then the rest is left out."""
+        """Does the log end before these frames, and the run soon after? Then the rest is left out."""
         step = self._steps[index]
-        left = len(self._counts) - step.tick
-        frames = self._received[place : place + step.frames]
-        ages_are_cut = left == 1 and self._run.gap is None and len(_messages(frames)) > len(step.told.ages)
-        if left > _TICKS_CUT or (len(frames) == step.frames and not ages_are_cut):
+        if len(self._counts) - step.tick > _TICKS_CUT or len(self._received) - place >= step.frames:
             return False
         self.ticks = step.tick
         return True
@@ -162,17 +156,8 @@ class Inputs:
     def _mend(self, index: int, place: int) -> bool:
         """Finds what fits after all, and some further steps with it.
 
-        That may be more frames than Taken can tell, two neighbours of different senders that change places, or frames
-        that never reached the controller.
+        That may be two neighbours of different senders that change places, or frames that never reached the controller.
         """
-        step = self._steps[index]
-        most = min(_FRAMES_MAX, len(self._received) - place)
-        for frames in range(step.frames + _TAKEN_WRAPS, most + 1, _TAKEN_WRAPS):
-            self._steps[index] = replace(step, frames=frames)
-            if self._is_sure(index, place, frames + _SURE_BEHIND):
-                self._counts[step.tick] = frames
-                return True
-        self._steps[index] = step
         for first in range(place, min(place + self._steps[index].frames, len(self._received) - 1)):
             a, b = self._received[first], self._received[first + 1]
             if a.sender != b.sender:
@@ -186,9 +171,7 @@ class Inputs:
     def _has_told_losses(self, index: int) -> bool:
         """Was the bus not as it should be in the tick, or in one since the last that took frames?"""
         first = self._steps[index - 1].tick + 1 if index else 0
-        return any(
-            tick.conditions & CHECKED_CONDITIONS for tick in self._run.ticks[first : self._steps[index].tick + 1]
-        )
+        return any(tick.may_lack for tick in self._run.ticks[first : self._steps[index].tick + 1])
 
     def _skip(self, index: int, place: int) -> bool:
         """Leaves out frames that never reached the controller, where then this step and some further ones fit."""
@@ -224,12 +207,6 @@ class Inputs:
         if after > len(self._received):
             return LogError(f"{where}the log ends before all frames that the controller has taken{cut}")
         lost = self._find_again(index, place)
-        messages, ages = len(_messages(self._received[place:after])), len(step.told.ages)
-        if lost == 0 and messages != ages:
-            return LogError(
-                f"{where}the log lacks CanopyArrivals frames: it has the ages of {ages} messages, and {messages} were "
-                f"taken{cut}"
-            )
         if lost is None:
             return LogError(f"{where}the log has other frames than the controller has taken{cut}")
         if lost > 0:
@@ -262,9 +239,8 @@ def _messages(frames: Iterable[Taken]) -> list[int]:
 
 
 def _steps(run: Run, ticks: int) -> Iterator[_Step]:
-    taken = check = 0
+    check = 0
     for place, tick in enumerate(run.ticks[:ticks]):
-        frames = (tick.taken - taken) % _TAKEN_WRAPS
-        if tick.ages:
-            yield _Step(place, frames or _TAKEN_WRAPS, check, tick)
-        taken, check = tick.taken, tick.check
+        if tick.frames:
+            yield _Step(place, tick.frames, check, tick)
+        check = tick.check

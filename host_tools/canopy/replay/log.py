@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """What a log of a bus says of one controller: its runs, tick by tick, with the frames that came in and went out.
 
-A run begins with the controller's tick 0. CanopyInputs gives the time of each tick and how many frames it has taken,
-CanopyArrivals how old they were; the log is complete as long as the sequence numbers of the trace have no gap. All of
-it is kept in memory.
+A run begins with the controller's tick 0. CanopyInputs and CanopyArrivals give of each tick the time, how many frames
+it has taken, and how old they were, CanopyModel the upper bits of the time; the log is complete as long as the sequence
+numbers of the trace have no gap. All of it is kept in memory.
 """
 
 from __future__ import annotations
@@ -15,23 +15,34 @@ from operator import xor
 from pathlib import Path
 
 import can
+from cantools.database import load_string
+from cantools.database.can import Database
 from cantools.database.can import Message as DbcMessage
 
+from canopy.compiler.trace_layout import dbc as trace_dbc
 from canopy.files import FileError, check_file
+from canopy.live.frames import ArrivalsFrame, TickFrame
+from canopy.live.trace_model import VERSION
 from canopy.model import Model, ModelError
-from canopy.replay.ticks import Tick
+from canopy.replay.ticks import Tick, find_times
 from canopy.signals import load_database, message_attribute
 from canopy.trace import mismatch
 from canopy.unixbus import encode
 
 _EXTENDED = 1 << 29
+_SEQUENCES = 64
 _LAST_TICK = (1 << 32) - 1
-_NUMBERED = ("CanopyTick", "CanopyChange", "CanopySnapshot")
+_NUMBERED = ("CanopyTick", "CanopySnapshot", "CanopyChange")
 NEEDED = ("CanopyTick", "CanopyInputs", "CanopyArrivals")
 """Trace messages without which nothing can be replayed."""
+COUNTED_MAX = 3 * 0xFFFF
+"""Stands for any number of frames that never left, from this one on."""
 AHEAD = 5
 """A command may be so many ticks ahead of its CanopyTick: a trace frame waits CANOPY_TRACE_PERIODS for the bus, 4."""
 SUFFIXES = (".log", ".asc", ".blf")
+
+
+_TRANSMIT_PAGE = 1
 
 
 class LogError(Exception):
@@ -50,7 +61,7 @@ class Bus:
         """Reads the DBC beside the model.
 
         Raises:
-            ModelError: It cannot be used, or the controller does not trace what a replay needs.
+            ModelError: It cannot be used.
         """
         database = load_database(model)
         self.model = model
@@ -61,27 +72,21 @@ class Bus:
         """Which kind a trace message is."""
         self.protected: dict[int, int] = {}
         """The E2E data ids of protected commands."""
-        for need in NEEDED:
-            if need not in model.trace:
-                raise ModelError(
-                    f"{model.path}: trace: has no {need}, without which nothing can be replayed: add it to the DBC as "
-                    "in docs/trace.md, build again, and record again"
-                )
         for message in database.messages:
             number = key(message.frame_id, message.is_extended_frame)
-            kind = message.name.partition("_")[0]
-            if model.trace.get(kind) == message.frame_id and model.bus_node in message.senders:
-                self.trace[number] = kind
-                self.sent[number] = message
-            elif message.name in model.send:
+            if message.name in model.send:
                 self.sent[number] = message
                 data_id = message_attribute(message, "E2EDataId", -1)
                 if data_id >= 0:
                     self.protected[number] = data_id
             elif message.name in model.receive:
                 self.received[number] = message
-        if len(self.trace) != len(model.trace):
-            raise ModelError(f"{model.path}: trace: {model.dbc.name} does not have these messages: build again")
+        trace = load_string(trace_dbc(model.trace.base, model.trace.extended, model.bus_node), "dbc")
+        assert isinstance(trace, Database)
+        for message in trace.messages:
+            number = key(message.frame_id, message.is_extended_frame)
+            self.sent[number] = message
+            self.trace[number] = message.name
 
 
 @dataclass(frozen=True)
@@ -139,7 +144,7 @@ class Run:
     """Why the model is not the controller's."""
 
     counted: list[tuple[int, int]] = field(default_factory=list)
-    """Tick and TxDropped of each CanopyHealth, also behind a gap."""
+    """Tick, and frames that never left, of each CanopyHealth that tells them, also behind a gap."""
 
 
 @dataclass
@@ -187,9 +192,14 @@ class _Reader:
     def end(self) -> Recording:
         """Leaves out the last tick where the log ends before its CanopyInputs and CanopyArrivals."""
         for run in self.recording.runs:
-            if run.ticks and _lacks(run.ticks) is not None:
+            if run.ticks and _lacks(run.ticks[-1]) is not None:
                 run.ticks.pop()
             self._end_at_hole(run)
+            known = find_times(run.ticks)
+            if known < len(run.ticks):
+                number = run.ticks[known].number
+                del run.ticks[known:]
+                run.gap = f"the time of tick {number} is not known: CanopyModel frames are missing"
         return self.recording
 
     def _end_at_hole(self, run: Run) -> None:
@@ -215,16 +225,11 @@ class _Reader:
 
     def _take_trace(self, kind: str, number: int, place: int, data: bytes) -> None:
         if kind == "CanopyTick":
-            tick = int.from_bytes(data[1:5], "little")
-            wraps = self._last_tick == _LAST_TICK
-            self._last_tick = tick
-            if tick == 0 and data[0] == 0 and not wraps:
-                self._begin()
-            elif self.recording.joined is None and not self.recording.runs:
-                self.recording.joined = tick
+            self._look_at_tick(place, TickFrame.read(data))
         if kind == "CanopyHealth" and self.recording.runs:
             run = self.recording.runs[-1]
-            run.counted.append((len(run.ticks) - 1, int.from_bytes(data[4:6], "little")))
+            if data[0] & 15 == _TRANSMIT_PAGE:
+                run.counted.append((len(run.ticks) - 1, _not_sent(data)))
         if self._run is None:
             self._commands.clear()
             return
@@ -234,9 +239,33 @@ class _Reader:
             return
         if kind in ("CanopyInputs", "CanopyArrivals") and not self._complete_tick(kind, place, data):
             return
-        if kind == "CanopyModel" and self._run.mismatch is None:
-            self._run.mismatch = mismatch(self._bus.model, data)
+        if kind == "CanopyModel":
+            self._take_model(data)
         self._run.sent.setdefault(number, []).append(Sent(place, len(self._run.ticks) - 1, data))
+
+    def _look_at_tick(self, place: int, frame: TickFrame) -> None:
+        """Is it of this version, and does a run begin?"""
+        if frame.version != VERSION:
+            raise LogError(
+                f"{self.recording.path}: frame {place} is no CanopyTick of trace version {VERSION}, but of version "
+                f"{frame.version}, or of an older one without a number; replay this log with the release of Canopy "
+                "that recorded it, and with the program and the model file of then"
+            )
+        wraps = self._last_tick == _LAST_TICK
+        self._last_tick = frame.tick
+        if frame.tick == frame.sequence == 0 and not wraps:
+            self._begin()
+        elif self.recording.joined is None and not self.recording.runs:
+            self.recording.joined = frame.tick
+
+    def _take_model(self, data: bytes) -> None:
+        """Page 0: which tree. Page 1: the upper bits of a tick's time."""
+        assert self._run is not None
+        if self._run.mismatch is None:
+            self._run.mismatch = mismatch(self._bus.model, data)
+        tick = self._run.ticks[-1]
+        if data[0] & 15 == 1 and int.from_bytes(data[1:3], "little") == tick.number & 0xFFFF:
+            tick.upper = int.from_bytes(data[3:6], "little")
 
     def _begin(self) -> None:
         """Tick 0. Of the commands before it all but the last ones may be those with which a run before has ended."""
@@ -252,23 +281,24 @@ class _Reader:
     def _follow(self, kind: str, place: int, data: bytes) -> None:
         """Notes what is missing; where a whole tick is, the next CanopyTick or CanopyInputs shows it."""
         assert self._run is not None
-        missing = (data[0] - self._sequence) % 256
-        self._sequence = (data[0] + 1) % 256
+        sequence = (data[6] if kind == "CanopyTick" else data[0]) % _SEQUENCES
+        missing = (sequence - self._sequence) % _SEQUENCES
+        self._sequence = (sequence + 1) % _SEQUENCES
         if missing and self._run.ticks:
-            text = f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 256"
+            text = f"before frame {place} ({kind}) {missing} trace frames are missing, or {missing} more than 64"
             self._run.holes.append(Hole(len(self._run.ticks) - 1, missing, text))
 
     def _add_tick(self, place: int, data: bytes) -> bool:
         assert self._run is not None
-        tick, ticks = int.from_bytes(data[1:5], "little"), self._run.ticks
-        lacking = _lacks(ticks) if ticks else None
+        tick, ticks = TickFrame.read(data).tick, self._run.ticks
+        lacking = _lacks(ticks[-1]) if ticks else None
         if lacking is not None:
             self._break(f"before frame {place} {lacking} of tick {ticks[-1].number} is missing")
             return False
         if ticks and tick != ticks[-1].number + 1:
             self._break(f"before frame {place} (tick {tick}) ticks are missing")
             return False
-        ticks.append(Tick(tick, place, ticks[-1].conditions if ticks else 0))
+        ticks.append(Tick(tick, place))
         for number, where, command in self._commands:
             self._run.sent.setdefault(number, []).append(Sent(where, len(ticks) - 1, command))
         self._commands.clear()
@@ -282,15 +312,20 @@ class _Reader:
             if tick.inputs:
                 self._break(f"before frame {place} a CanopyTick is missing")
                 return False
-            tick.inputs = data
-        elif not tick.inputs:
-            self._break(f"before frame {place} CanopyInputs of tick {tick.number} is missing")
-            return False
-        elif data[7] != tick.number & 0xFF:
-            self._break(f"before frame {place} (CanopyArrivals of another tick than {tick.number}) frames are missing")
-            return False
+            tick.take_inputs(data)
         else:
-            tick.take_arrivals(data)
+            frame = ArrivalsFrame.read(data)
+            if not tick.inputs:
+                self._break(f"before frame {place} CanopyInputs of tick {tick.number} is missing")
+                return False
+            if frame is None or frame.tick != tick.number % 16 or tick.is_whole:
+                self._break(f"before frame {place} (CanopyArrivals, not of tick {tick.number}) frames are missing")
+                return False
+            tick.take_arrivals(frame)
+        before = self._run.ticks[-2].taken if len(self._run.ticks) > 1 else 0
+        if tick.is_whole and not tick.read_ages(before):
+            self._break(f"frame {place} ({kind} of tick {tick.number}) tells ages that cannot be; frames are missing")
+            return False
         return True
 
     def _break(self, gap: str) -> None:
@@ -301,11 +336,17 @@ class _Reader:
             self._run = None
 
 
-def _lacks(ticks: list[Tick]) -> str | None:
-    """Which message the last tick lacks; None: none, as far as can be told without the frames that it took."""
-    if not ticks[-1].inputs:
+def _lacks(tick: Tick) -> str | None:
+    """Which message a tick lacks; None: none."""
+    if not tick.inputs:
         return "CanopyInputs"
-    return "CanopyArrivals" if ticks[-1].lacks_arrivals(ticks[-2] if len(ticks) > 1 else None) else None
+    return None if tick.is_whole else "CanopyArrivals"
+
+
+def _not_sent(data: bytes) -> int:
+    """What a CanopyHealth counts of frames that never left: replaced, expired, trace frames that were dropped."""
+    counts = [int.from_bytes(data[place : place + 2], "little") for place in (1, 3, 5)]
+    return COUNTED_MAX if 0xFFFF in counts else sum(counts)
 
 
 def read_recording(path: Path, model: Model, channel: str | None = None) -> Recording:

@@ -6,50 +6,45 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import can
 
 from canopy.replay.inputs import Inputs
-from canopy.replay.log import Bus, Run
-from canopy.replay.ticks import Tick
-from canopy.unixbus import HEADER, REMOTE, decode, encode
+from canopy.replay.log import Run
+from canopy.unixbus import HEADER, REMOTE, decode
+
+BEGIN = b"CANOPY RECORD 2\n"
+"""CANOPY_REPLAY_BEGIN."""
 
 
 class ProgramError(Exception):
     """The program cannot be run on a record; the text says which, why, and the way out."""
 
 
-def write_record(path: Path, bus: Bus, run: Run, inputs: Inputs) -> None:
-    """Writes for each tick CanopyInputs, the state of the bus, and the frames that it took, each behind its age.
+def write_record(path: Path, run: Run, inputs: Inputs) -> None:
+    """Writes for each tick its time and the state of its bus, and the frames that it took, each with its age.
 
-    The form is that of canopy/clock/replay.h.
+    The form is that of canopy/clock/replay_files.h; it has nothing to do with the frames of the trace.
 
     Raises:
         OSError: The file cannot be written.
     """
-    begin, arrivals = (_message(bus, kind) for kind in ("CanopyInputs", "CanopyArrivals"))
-    conditions = 0
     with path.open("wb") as file:
+        file.write(BEGIN)
         for tick, frames, ages in zip(run.ticks, inputs, inputs.ages, strict=False):
-            file.write(encode(can.Message(**begin, data=tick.inputs)))
+            file.write(tick_item(tick.now, tick.can_state, tick.overload, tick.returning))
             for frame in frames:
-                file.write(encode(can.Message(**arrivals, data=_arrival(tick, ages[frame.message]))))
-                file.write(frame.datagram)
-            if not frames and tick.conditions != conditions:
-                file.write(encode(can.Message(**arrivals, data=_arrival(tick, None))))
-            conditions = tick.conditions
+                file.write(frame_item(ages[frame.message], frame.datagram))
 
 
-def _message(bus: Bus, kind: str) -> dict[str, Any]:
-    message = next(bus.sent[number] for number, name in bus.trace.items() if name == kind)
-    return {"arbitration_id": message.frame_id, "is_extended_id": message.is_extended_frame}
+def tick_item(now: int, can_state: int = 0, overload: bool = False, returning: bool = False) -> bytes:
+    """What begins a tick in a record; `now` [us]."""
+    return b"T" + now.to_bytes(8, "little") + bytes([can_state, overload | returning << 1])
 
 
-def _arrival(tick: Tick, age: int | None) -> bytes:
-    """CanopyArrivals with the age of the next frame; None: only with the state of the bus."""
-    count = 0 if age is None else 1
-    return bytes([tick.conditions | count << 4, *(age or 0).to_bytes(2, "little"), 0, 0, 0, 0, tick.number & 0xFF])
+def frame_item(age: int, datagram: bytes) -> bytes:
+    """A frame in a record, of a certain age [ms]."""
+    return b"F" + age.to_bytes(2, "little") + datagram
 
 
 def run_program(program: Path, arguments: tuple[str, ...], record: Path, sent: Path) -> None:

@@ -19,6 +19,7 @@ from canopy.escape.terminal import echo, echo_lines
 from canopy.files import FileError, read_bytes, write_files
 from canopy.verify.certify import certificate
 from canopy.verify.claims import Result
+from canopy.verify.logic import cli as logic
 from canopy.verify.model import Plant, number
 from canopy.verify.run import Subject, chosen, hand_over, load, model_path, recheck, verify
 from canopy.verify.solvers import SOLVERS
@@ -128,6 +129,19 @@ def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tu
             raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
 
 
+WITH_MODEL = ("model", "dbc", "node", "names", "solver", "folder", "checked_folder", "handover")
+
+
+def _logic_usage(asked: bool, period: int | None) -> None:
+    """Rejects options that do not go with questions about the logic alone, or only with them."""
+    if period is not None and not asked:
+        raise click.UsageError("--period goes with --never or --always")
+    context = click.get_current_context()
+    for option in context.command.params if asked else ():
+        if option.name in WITH_MODEL and context.params[option.name]:
+            raise click.UsageError(f"{option.opts[0]} needs a model: it does not go with --never or --always")
+
+
 def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json_: bool) -> None:
     """Ends with what the results say."""
     if json_:
@@ -147,10 +161,17 @@ def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json
 @click.option("--claim", "names", multiple=True, metavar="NAME", help="Only this claim; may be given several times.")
 @click.option("--solver", multiple=True, type=click.Choice(SOLVERS), help="Have a solver check the proofs again.")
 @click.option(
-    "--timeout", default=60.0, show_default=True, type=click.FloatRange(0.1, 86_400), help="Seconds per claim."
+    "--timeout",
+    default=60.0,
+    show_default=True,
+    type=click.FloatRange(0.1, 86_400),
+    help="Seconds per claim or question.",
 )
 @click.option("--certificate", "folder", type=click.Path(path_type=Path), help="Write certificates to this folder.")
 @click.option("--check", "checked_folder", type=click.Path(path_type=Path), help="Only check a folder's certificates.")
+@click.option("--never", multiple=True, metavar="FORMULA", help="Without a model: does no tick fulfil this?")
+@click.option("--always", multiple=True, metavar="FORMULA", help="Without a model: does every tick fulfil this?")
+@click.option("--period", type=click.IntRange(1, 3_600_000), help="Of --never, --always: time between ticks [ms].")
 @click.option("--handover", is_flag=True, help="Also print which leaf hands over to which.")
 @click.option("--trace", "whole", is_flag=True, help="Print every trace, and all of it.")
 @click.option("--json", "json_", is_flag=True, help="Print JSON.")
@@ -170,6 +191,9 @@ def command(
     timeout: float,
     folder: Path | None,
     checked_folder: Path | None,
+    never: tuple[str, ...],
+    always: tuple[str, ...],
+    period: int | None,
     handover: bool,
     whole: bool,
     json_: bool,
@@ -182,8 +206,11 @@ def command(
     A certificate has the numbers that show a claim of the kinds reaches and avoids. --check judges them again with a
     small program that has no solver, and that reads tree and model by itself.
 
-    Exit status: 0 all came out as the model file expects, 1 one did not, a solver disagrees, or a certificate is
-    rejected, 2 wrong input.
+    --never and --always need no model: they ask about the statuses of nodes, now and in the past, for any answers that
+    the leaves declare. They need the program berkeley-abc.
+
+    Exit status: 0 all came out as the model file expects, and all questions are proven, 1 one did not, a solver
+    disagrees, or a certificate is rejected, 2 wrong input.
 
     \b
     Examples:
@@ -192,13 +219,20 @@ def command(
       canopy verify examples/nao/trees/get_home.xml --solver z3 --solver cvc5 --json
       canopy verify examples/nao/trees/get_home.xml --certificate proofs
       canopy verify examples/nao/trees/get_home.xml --check proofs
+      canopy verify TREE --never 'RUNNING(A) and RUNNING("Go home")'
+      canopy verify TREE --always 'responds(SUCCESS(Overheated), RUNNING(Fan), 3)'
     """
+    questions = [("--never", one) for one in never] + [("--always", one) for one in always]
+    _logic_usage(bool(questions), period)
     _usage(dbc, node, main_tree, solver, folder is not None or checked_folder is not None)
     results = []
     if checked_folder is not None:
         sys.exit(_check(checked_folder, tree, model or model_path(tree)))
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
+        if questions:
+            code = logic.run(tree, questions, options, period_ms=period, timeout=timeout, whole=whole, json_=json_)
+            sys.exit(code)
         subject = load(tree, model or model_path(tree), dbc, node or "", options)
         for claim in chosen(subject, names):
             result = verify(subject, claim, timeout)

@@ -94,8 +94,8 @@ typedef struct {
     canopy_rx_state_t *rx; /**< bus->rx_count. */
     canopy_bus_counters_t counters;
     /** What CanopyInputs tells of the frames taken since the start, so that a replay can take the same ones: */
-    uint8_t taken; /**< How many had the id of a message, refused ones too; modulo 256. */
-    uint8_t check; /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
+    uint32_t taken; /**< How many had the id of a message, refused ones too; modulo 2^32. */
+    uint8_t check;  /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
 } canopy_bus_state_t;
 
 /**

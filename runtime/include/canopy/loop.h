@@ -30,7 +30,7 @@ typedef struct {
     canopy_time_t period; /**< [us], > 0. */
     const canopy_tree_t *tree;
     const canopy_bus_t *bus;
-    const canopy_trace_config_t *trace;
+    const canopy_trace_config_t *trace;        /**< NULL: no trace. */
     const canopy_can_acceptance_t *acceptance; /**< What it receives: for the driver's filter. */
     uint32_t rx_max;                           /**< Frames that the bus can carry in one period, > 0. */
     uint32_t frame_us;                         /**< How long the bus takes for a frame of 8 bytes [us], > 0. */
@@ -38,7 +38,7 @@ typedef struct {
     void (*start)(
         void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
     canopy_tree_instance_t *tree_instance;
-    uint8_t *status; /**< tree->node_count. */
+    uint8_t *status; /**< tree->node_count; with a trace, of an array of uint32_t. */
     uint16_t *words; /**< tree->word_count. */
     canopy_bus_state_t *bus_state;
     void *input;           /**< The input image. */
@@ -46,8 +46,10 @@ typedef struct {
     canopy_rx_state_t *rx; /**< bus->rx_count. */
     canopy_tx_t *tx;       /**< The transmit side: for the driver's transmit interrupt. */
     canopy_tx_memory_t tx_memory;
-    canopy_trace_state_t *trace_state;
-    uint8_t *sent; /**< tree->node_count. */
+    canopy_trace_state_t *trace_state; /**< NULL without trace, as the next two. */
+    uint8_t *sent;                     /**< nodes_max; of an array of uint32_t. */
+    uint32_t *told;                    /**< trace->value_count, or NULL. */
+    uint16_t nodes_max;                /**< Nodes that `status` and `sent` have room for: of the largest tree image. */
 } canopy_app_t;
 
 /** Numbers of the fault hook; stable. */

@@ -30,7 +30,8 @@
 /** What to do next. Below CANOPY_STEP_DONE: tick this child. Else CANOPY_STEP_DONE + status: see canopy_done(). */
 typedef uint32_t canopy_step_t;
 
-#define CANOPY_STEP_DONE 0x10000u
+/** Its low byte is CANOPY_STATUS_BASE, so that the low byte of a step that is done is what is stored of the status. */
+#define CANOPY_STEP_DONE 0x10006u
 
 /** The node is done for this tick, with this status. */
 static inline canopy_step_t canopy_done(canopy_status_t status)
@@ -41,13 +42,13 @@ static inline canopy_step_t canopy_done(canopy_status_t status)
 /** Was the node RUNNING when this tick came to it? (A node's status is stored when it returns.) */
 static inline bool canopy_resumes(const canopy_tree_instance_t *self, uint16_t node)
 {
-    return self->status[node] == (uint8_t)CANOPY_RUNNING;
+    return canopy_status_runs(self->status[node]);
 }
 
 /** Does the node go on: was it RUNNING when this tick came to it, or SKIPPED and not reset since? */
 static inline bool canopy_goes_on(const canopy_tree_instance_t *self, uint16_t node)
 {
-    return self->status[node] == (uint8_t)CANOPY_RUNNING || self->status[node] == (uint8_t)CANOPY_SKIPPED;
+    return canopy_status_runs(self->status[node]) || canopy_status_is_skipped(self->status[node]);
 }
 
 /** Halts a subtree if it is RUNNING: every RUNNING node in it once, deepest first. O(nodes in it). */
@@ -56,7 +57,7 @@ void canopy_halt_subtree(canopy_tree_instance_t *self, uint16_t top);
 /** The parent resets a child: halted if RUNNING, then IDLE. O(1), or O(nodes below) when it is RUNNING. */
 static inline void canopy_reset_child(canopy_tree_instance_t *self, uint16_t child)
 {
-    if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
+    if (canopy_status_runs(self->status[child])) {
         canopy_halt_subtree(self, child);
     }
     self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;
@@ -83,9 +84,9 @@ static inline bool canopy_reset_children(canopy_tree_instance_t *self, uint16_t 
     bool all_skipped = true;
 
     for (uint16_t child = first; child != end; child = nodes[child].end) {
-        all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
+        all_skipped = all_skipped && canopy_status_is_skipped(self->status[child]);
         /* canopy_reset_child(), but not a call of its own: this is where the stack is deepest. */
-        if (self->status[child] == (uint8_t)CANOPY_RUNNING) {
+        if (canopy_status_runs(self->status[child])) {
             canopy_halt_subtree(self, child);
         }
         self->status[child] |= (uint8_t)CANOPY_STATUS_WAS;

@@ -20,6 +20,7 @@
 
 #include "canopy/clock.h"
 #include "canopy/status.h"
+#include "canopy/status_code.h"
 
 /** Largest number of nodes of a tree (indices 0..65533; 65534 and 65535 mean "none" in tables and traces). */
 #define CANOPY_NODES_MAX 65534u
@@ -97,17 +98,12 @@ typedef struct {
 typedef struct canopy_tree_instance {
     const canopy_tree_t *tree;
     void *application;
-    uint8_t *status; /**< A status code a node, see canopy_tree_status_code(). */
+    uint8_t *status; /**< A byte a node, see canopy/status_code.h. */
     uint16_t *words;
     canopy_time_t now;   /**< Of the tick under way. */
     uint32_t faults;     /**< Leaves that returned no valid status (rule 7). Saturates. */
     uint16_t fault_node; /**< The last such leaf. */
 } canopy_tree_instance_t;
-
-/**
- * In a status code: the node is IDLE now, and the low bits keep what it last returned, so that a monitor can show it.
- */
-#define CANOPY_STATUS_WAS 8u
 
 /**
  * Makes an instance: every node IDLE, every counter 0.
@@ -161,18 +157,17 @@ void canopy_tree_reset(canopy_tree_instance_t *self);
 /** Status of a node now: IDLE for one that its parent has reset. node must be < node_count (not checked). O(1). */
 static inline canopy_status_t canopy_tree_status(const canopy_tree_instance_t *self, uint16_t node)
 {
-    uint8_t code = self->status[node];
-
-    return (code & CANOPY_STATUS_WAS) != 0u ? CANOPY_IDLE : (canopy_status_t)code;
+    return canopy_status_now(self->status[node]);
 }
 
 /**
- * Status code of a node: its canopy_status_t, or CANOPY_STATUS_WAS + what it was before its parent reset it. node must be
+ * Status code of a node (canopy/status_code.h): what it returned last, whether in the last tick, and whether its parent has
+ * reset it since. Without a trace nobody marks what is old: every result counts as one of the last tick. node must be
  * < node_count (not checked). O(1).
  */
 static inline uint8_t canopy_tree_status_code(const canopy_tree_instance_t *self, uint16_t node)
 {
-    return self->status[node];
+    return canopy_status_code(self->status[node]);
 }
 
 #endif

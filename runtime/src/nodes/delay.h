@@ -15,7 +15,7 @@ static inline canopy_step_t canopy_delay_enter(canopy_tree_instance_t *self, uin
     uint16_t *words = canopy_words(self, node);
     uint16_t child = (uint16_t)(node + 1u);
 
-    if (canopy_resumes(self, child) || self->status[node] == (uint8_t)CANOPY_SKIPPED) {
+    if (canopy_resumes(self, child) || canopy_status_is_skipped(self->status[node])) {
         return child;
     }
     if (!canopy_resumes(self, node)) {

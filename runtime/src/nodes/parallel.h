@@ -33,8 +33,7 @@ static inline uint16_t canopy_parallel_open_child(const canopy_tree_instance_t *
         loop assigns child;
         loop variant nodes[node].end - child;
     */
-    while (child != nodes[node].end &&
-           (self->status[child] == (uint8_t)CANOPY_SUCCESS || self->status[child] == (uint8_t)CANOPY_FAILURE)) {
+    while (child != nodes[node].end && canopy_status_is_completed(self->status[child])) {
         child = nodes[child].end;
     }
     return child;

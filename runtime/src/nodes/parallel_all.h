@@ -26,7 +26,7 @@ static CANOPY_SELDOM canopy_step_t canopy_parallel_all_child(canopy_tree_instanc
         return next;
     }
     for (child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
-        counts[self->status[child]]++;
+        counts[canopy_status_last(self->status[child])]++;
         children++;
     }
     if (counts[CANOPY_RUNNING] != 0) {

@@ -25,7 +25,7 @@ static CANOPY_SELDOM canopy_status_t canopy_reactive_parallel_verdict(const cano
     int32_t needed;
 
     for (uint16_t child = (uint16_t)(node + 1u); child != nodes[node].end; child = nodes[child].end) {
-        counts[self->status[child]]++;
+        counts[canopy_status_last(self->status[child])]++;
         children++;
     }
     if (counts[CANOPY_SKIPPED] == children) {

@@ -47,13 +47,13 @@ static inline bool canopy_sequence_is_reactive(const canopy_node_t *at)
 
 static inline void canopy_sequence_reset(canopy_tree_instance_t *self, canopy_index_t child, canopy_status_t status)
 {
-    self->status[child] = (uint8_t)(status + CANOPY_STATUS_WAS);
+    self->status[child] = (uint8_t)(status + (CANOPY_STATUS_BASE + CANOPY_STATUS_WAS));
 }
 
 static inline canopy_index_t canopy_sequence_enter(const canopy_tree_instance_t *self, const canopy_node_t *at,
                                                    canopy_index_t node)
 {
-    bool resumes = self->status[node] == (uint8_t)CANOPY_RUNNING && !canopy_sequence_is_reactive(at);
+    bool resumes = canopy_status_runs(self->status[node]) && !canopy_sequence_is_reactive(at);
 
     return resumes ? self->words[at->state] : node + 1u;
 }
@@ -87,7 +87,7 @@ static CANOPY_SELDOM void canopy_sequence_reset_all(canopy_tree_instance_t *self
 static inline canopy_index_t canopy_sequence_complete(canopy_tree_instance_t *self, canopy_index_t node,
                                                       canopy_status_t status)
 {
-    if (self->status[node] == (uint8_t)CANOPY_RUNNING) {
+    if (canopy_status_runs(self->status[node])) {
         canopy_sequence_reset_all(self, node);
     }
     return canopy_done(status);
@@ -104,7 +104,7 @@ static CANOPY_SELDOM canopy_index_t canopy_sequence_skipped(canopy_tree_instance
         return next;
     }
     for (canopy_index_t child = node + 1u; child != next; child = nodes[child].end) {
-        if ((self->status[child] & (uint8_t)~CANOPY_STATUS_WAS) != (uint8_t)CANOPY_SKIPPED) {
+        if (!canopy_status_is_skipped((uint8_t)(self->status[child] & ~CANOPY_STATUS_WAS))) {
             status = canopy_sequence_go_on(&nodes[node]);
         }
     }

@@ -64,7 +64,7 @@ static CANOPY_SELDOM canopy_step_t canopy_try_catch_child(canopy_tree_instance_t
         return next;
     }
     for (child = first; child != next; child = nodes[child].end) {
-        all_skipped = all_skipped && self->status[child] == (uint8_t)CANOPY_SKIPPED;
+        all_skipped = all_skipped && canopy_status_is_skipped(self->status[child]);
     }
     (void)canopy_reset_children(self, node, first);
     return canopy_done(all_skipped ? CANOPY_SKIPPED : CANOPY_SUCCESS);
@@ -93,7 +93,7 @@ static CANOPY_SELDOM void canopy_try_catch_halt(canopy_tree_instance_t *self, ui
     } else {
         leaf->halted(self->application, parameter);
     }
-    self->status[handler] = (uint8_t)((uint8_t)CANOPY_STATUS_WAS | (uint8_t)status);
+    self->status[handler] = canopy_status_reset(canopy_status_stored(status));
 }
 
 #endif

@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xa4aecf69f4c7bfdau
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_APP_H != 0xa4aecf69f4c7bfdau
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xa4aecf69f4c7bfdau
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -29,7 +29,6 @@
 typedef struct {
     canopy_tree_instance_t tree;
     canopy_bus_state_t bus;
-    canopy_trace_state_t trace;
     canopy_tx_t tx;
     canopy_tx_slot_t tx_slots[COOLER_TX_MESSAGES];
     canopy_tx_trace_t tx_trace[1];
@@ -38,8 +37,7 @@ typedef struct {
     cooler_entries_t entries;
     canopy_rx_state_t rx[COOLER_RX_MESSAGES];
     uint16_t words[COOLER_WORDS];
-    uint8_t status[COOLER_NODES];
-    uint8_t sent[COOLER_NODES];
+    uint32_t status[(COOLER_NODES + 3u) / 4u]; /* bytes, one a node: the trace compares them by words */
     uint8_t tx_data[COOLER_TX_BYTES];
     beep_state_t beep[1];
 } cooler_memory_t;
@@ -218,7 +216,9 @@ static const canopy_node_t nodes[] = {
     {.type = CANOPY_NODE_SYNC_ACTION, .parent = 0, .end = 12, .leaf = COOLER_LEAF_BEEP, .parameter = 0},
 };
 
-static const canopy_tree_t tree = {
+/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
+extern const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_cooler_dbc;
+const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_cooler_dbc = {
     .nodes = nodes,
     .leaves = leaves,
     .controls = NULL,
@@ -231,21 +231,6 @@ static const canopy_tree_t tree = {
     .parameter_count = sizeof parameters / sizeof parameters[0],
     .word_count = COOLER_WORDS,
     .hash = UINT32_C(0xaeb7d54f), /* first 8 digits of COOLER_TREE_HASH */
-};
-
-/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
-extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_cooler_dbc;
-const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_cooler_dbc = {
-    .tick = {.id = CANOPY_TRACE_OFF},
-    .inputs = {.id = CANOPY_TRACE_OFF},
-    .arrivals = {.id = CANOPY_TRACE_OFF},
-    .change = {.id = CANOPY_TRACE_OFF},
-    .snapshot = {.id = CANOPY_TRACE_OFF},
-    .health = {.id = CANOPY_TRACE_OFF},
-    .model = {.id = CANOPY_TRACE_OFF},
-    .health_every = 1, /* ticks */
-    .model_every = 1,  /* ticks */
-    .changes_max = 6,  /* frames a tick */
 };
 
 /** Every entry as the tree gives it, the state of every node of yours 0. */
@@ -265,16 +250,16 @@ static void start(void *memory_of_app)
 const canopy_app_t cooler_app = {
     .name = "cooler",
     .period = COOLER_PERIOD_US,
-    .tree = &tree,
+    .tree = &canopy_only_one_application_may_be_node_Controller_of_cooler_dbc,
     .bus = &cooler_bus,
-    .trace = &canopy_only_one_application_may_be_node_Controller_of_cooler_dbc,
+    .trace = NULL,
     .acceptance = &cooler_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
-    .status = memory.status,
+    .status = (uint8_t *)memory.status,
     .words = memory.words,
     .bus_state = &memory.bus,
     .input = &memory.input,
@@ -282,6 +267,5 @@ const canopy_app_t cooler_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .trace_state = &memory.trace,
-    .sent = memory.sent,
+    .nodes_max = sizeof memory.status,
 };

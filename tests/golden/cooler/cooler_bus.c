@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x14f7344958d15596u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xa4aecf69f4c7bfdau
 #error "files of two runs of canopy: generate them again"
 #endif
 

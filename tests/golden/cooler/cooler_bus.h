@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COOLER_BUS_H
-#define CANOPY_GENERATED_COOLER_BUS_H 0x14f7344958d15596u /* of this run */
+#define CANOPY_GENERATED_COOLER_BUS_H 0xa4aecf69f4c7bfdau /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x212ea31854f64dc9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_APP_H != 0x212ea31854f64dc9u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -48,8 +48,8 @@ typedef struct {
     courier_entries_t entries;
     canopy_rx_state_t rx[COURIER_RX_MESSAGES];
     uint16_t words[COURIER_WORDS];
-    uint8_t status[COURIER_NODES];
-    uint8_t sent[COURIER_NODES];
+    uint32_t status[(COURIER_NODES + 3u) / 4u]; /* bytes, one a node: the trace compares them by words */
+    uint32_t sent[(COURIER_NODES + 3u) / 4u];
     uint8_t tx_data[COURIER_TX_BYTES];
     request_t compute_path[1];
     request_t clear_map[2];
@@ -495,7 +495,9 @@ static const canopy_node_t nodes[] = {
     {.type = CANOPY_NODE_SLEEP, .parent = 12, .end = 17, .state = 5, .parameter = 1},
 };
 
-static const canopy_tree_t tree = {
+/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
+extern const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc;
+const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc = {
     .nodes = nodes,
     .leaves = leaves,
     .controls = controls,
@@ -510,19 +512,18 @@ static const canopy_tree_t tree = {
     .hash = UINT32_C(0x61a2a79e), /* first 8 digits of COURIER_TREE_HASH */
 };
 
-/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
-extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc;
-const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_courier_dbc = {
-    .tick = {.id = COURIER_CANOPY_TICK_ID},
-    .inputs = {.id = CANOPY_TRACE_OFF},
-    .arrivals = {.id = CANOPY_TRACE_OFF},
-    .change = {.id = COURIER_CANOPY_CHANGE_ID},
-    .snapshot = {.id = COURIER_CANOPY_SNAPSHOT_ID},
-    .health = {.id = COURIER_CANOPY_HEALTH_ID},
-    .model = {.id = CANOPY_TRACE_OFF},
-    .health_every = 20, /* ticks */
-    .model_every = 1,   /* ticks */
-    .changes_max = 8,   /* frames a tick */
+static const canopy_trace_config_t trace = {
+    .id = 0x600u,
+    .flags = 0,
+    .changes_max = 8, /* frames a tick */
+    .values_max = 0,  /* frames a tick */
+    .data_id = CANOPY_E2E_NONE,
+    .snapshot_every = 20, /* ticks */
+    .values_every = 40,   /* ticks */
+    .health_every = 4,    /* ticks */
+    .model_every = 20,    /* ticks */
+    .value_count = 0,
+    .values = NULL,
 };
 
 /** Every entry as the tree gives it, the state of every node of yours 0. */
@@ -544,16 +545,16 @@ static void start(void *memory_of_app)
 const canopy_app_t courier_app = {
     .name = "courier",
     .period = COURIER_PERIOD_US,
-    .tree = &tree,
+    .tree = &canopy_only_one_application_may_be_node_Controller_of_courier_dbc,
     .bus = &courier_bus,
-    .trace = &canopy_only_one_application_may_be_node_Controller_of_courier_dbc,
+    .trace = &trace,
     .acceptance = &courier_acceptance,
     .rx_max = 532u,
     .frame_us = 320u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
-    .status = memory.status,
+    .status = (uint8_t *)memory.status,
     .words = memory.words,
     .bus_state = &memory.bus,
     .input = &memory.input,
@@ -561,6 +562,8 @@ const canopy_app_t courier_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 16u},
+    .nodes_max = sizeof memory.status,
     .trace_state = &memory.trace,
-    .sent = memory.sent,
+    .sent = (uint8_t *)memory.sent,
+    .told = NULL,
 };

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x46ac56d2eb228f67u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
 #error "files of two runs of canopy: generate them again"
 #endif
 

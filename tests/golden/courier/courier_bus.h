@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0x46ac56d2eb228f67u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0x212ea31854f64dc9u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -89,12 +89,6 @@ typedef enum {
 #define COURIER_DRIVE_SPEED_X(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
 /** Drive.SpeedY [mm/s]: raw value of a physical constant; 1 bit is 1 mm/s. */
 #define COURIER_DRIVE_SPEED_Y(physical) CANOPY_RAW(int32_t, physical, 1.0, 0.0)
-
-/* The trace. */
-#define COURIER_CANOPY_TICK_ID 0x600u
-#define COURIER_CANOPY_CHANGE_ID 0x601u
-#define COURIER_CANOPY_SNAPSHOT_ID 0x602u
-#define COURIER_CANOPY_HEALTH_ID 0x603u
 
 /**
  * What leaves read. Values are the last ones received; `fresh` says whether the message's timeout has not passed since they

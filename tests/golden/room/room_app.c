@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xbf8e39fa0ce5f853u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_APP_H != 0xbf8e39fa0ce5f853u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -27,7 +27,6 @@
 typedef struct {
     canopy_tree_instance_t tree;
     canopy_bus_state_t bus;
-    canopy_trace_state_t trace;
     canopy_tx_t tx;
     canopy_tx_slot_t tx_slots[ROOM_TX_MESSAGES];
     canopy_tx_trace_t tx_trace[1];
@@ -35,8 +34,7 @@ typedef struct {
     room_output_t output;
     canopy_rx_state_t rx[ROOM_RX_MESSAGES];
     uint16_t words[1];
-    uint8_t status[ROOM_NODES];
-    uint8_t sent[ROOM_NODES];
+    uint32_t status[(ROOM_NODES + 3u) / 4u]; /* bytes, one a node: the trace compares them by words */
     uint8_t tx_data[ROOM_TX_BYTES];
 } room_memory_t;
 
@@ -86,7 +84,9 @@ static const canopy_node_t nodes[] = {
     {.type = CANOPY_NODE_SYNC_ACTION, .parent = 0, .end = 3, .leaf = ROOM_LEAF_RUN_FAN, .parameter = 0},
 };
 
-static const canopy_tree_t tree = {
+/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
+extern const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_room_dbc;
+const canopy_tree_t canopy_only_one_application_may_be_node_Controller_of_room_dbc = {
     .nodes = nodes,
     .leaves = leaves,
     .controls = NULL,
@@ -101,33 +101,18 @@ static const canopy_tree_t tree = {
     .hash = UINT32_C(0xd6027370), /* first 8 digits of ROOM_TREE_HASH */
 };
 
-/* A node of the bus is one application: a message has one sender. A second one with this name does not link. */
-extern const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_room_dbc;
-const canopy_trace_config_t canopy_only_one_application_may_be_node_Controller_of_room_dbc = {
-    .tick = {.id = CANOPY_TRACE_OFF},
-    .inputs = {.id = CANOPY_TRACE_OFF},
-    .arrivals = {.id = CANOPY_TRACE_OFF},
-    .change = {.id = CANOPY_TRACE_OFF},
-    .snapshot = {.id = CANOPY_TRACE_OFF},
-    .health = {.id = CANOPY_TRACE_OFF},
-    .model = {.id = CANOPY_TRACE_OFF},
-    .health_every = 1, /* ticks */
-    .model_every = 1,  /* ticks */
-    .changes_max = 2,  /* frames a tick */
-};
-
 const canopy_app_t room_app = {
     .name = "room",
     .period = ROOM_PERIOD_US,
-    .tree = &tree,
+    .tree = &canopy_only_one_application_may_be_node_Controller_of_room_dbc,
     .bus = &room_bus,
-    .trace = &canopy_only_one_application_may_be_node_Controller_of_room_dbc,
+    .trace = NULL,
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
     .memory = &memory,
     .tree_instance = &memory.tree,
-    .status = memory.status,
+    .status = (uint8_t *)memory.status,
     .words = memory.words,
     .bus_state = &memory.bus,
     .input = &memory.input,
@@ -135,6 +120,5 @@ const canopy_app_t room_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .trace_state = &memory.trace,
-    .sent = memory.sent,
+    .nodes_max = sizeof memory.status,
 };

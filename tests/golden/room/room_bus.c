@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0x6ca8e566c6a1c77du
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -4,19 +4,10 @@
  * Replay of a record: a CAN driver and a clock in one, which give the loop the frames and the times of an earlier run
  * (docs/replay.md). The loop, the tree and the leaves are the real ones; they cannot tell the difference.
  *
- * A record is a sequence of frames. Each tick is, in this order:
- *
- *   CanopyInputs     begins the tick; its Now is the tick's time. Taken and Check are ignored.
- *   CanopyArrivals   says what is true from here on. CanState, Overload and Returning are the tick's: the last frame of
- *                    the tick counts, and a tick without one has those of the tick before (all 0 at the start).
- *                    Age0 is the age in ms of each frame that follows in this tick, until the next CanopyArrivals; frames
- *                    before the first one have the age 0. Count, Age1, Age2 and Tick are ignored.
- *   any other frame  was taken by the tick. Its time is Now - Age0.
- *
- * The frames of a tick are in the order in which they were taken. `canopy replay` makes the record from a log of the bus:
- * there a tick's CanopyArrivals holds up to three ages; in the record it gives one for each taken frame (which may be left
- * out while nothing changes). Time stands still within a tick, and the next one begins at once; so a replay is as fast as
- * the machine.
+ * A record is a sequence of items. A tick's item gives its time and the state of the bus; behind it come the frames that
+ * the tick has taken, in that order, each with its age. It has nothing to do with what the frames of the trace look like:
+ * `canopy replay` reads those, and makes the record. Time stands still within a tick, and the next one begins at once; so a
+ * replay is as fast as the machine.
  *
  * What the loop sends is out at once: frames that a busy bus held up, replaced or dropped in the recorded run are sent in
  * the replay. The state of the bus is the recorded one (canopy_can_t.conditions), so the decisions are the same.
@@ -33,13 +24,21 @@
 #include "canopy/can.h"
 #include "canopy/clock.h"
 #include "canopy/status.h"
-#include "canopy/trace.h"
+
+/** One item of a record. */
+typedef struct {
+    bool is_tick;                       /**< Begins a tick; else a frame that the tick has taken. */
+    canopy_time_t now;                  /**< Of a tick: its time [us]. */
+    canopy_can_conditions_t conditions; /**< Of a tick: the state of its bus. */
+    uint16_t age;                       /**< Of a frame: how old it was when it was taken [ms]. */
+    canopy_can_frame_t frame;           /**< Its time is not looked at. */
+} canopy_replay_item_t;
 
 /** Where the record comes from, and where the frames go that the controller sends. */
 typedef struct {
     void *context; /**< Handed to both. */
-    /** Gives the record's next frame. @return 1 a frame was written, 0 the record ends, negative canopy_error_t. */
-    int (*read)(void *context, canopy_can_frame_t *frame);
+    /** Gives the record's next item. @return 1 an item was written, 0 the record ends, negative canopy_error_t. */
+    int (*read)(void *context, canopy_replay_item_t *item);
     /** Takes a frame that the controller sends. @return 1, or negative canopy_error_t: the replay ends. NULL: nobody looks. */
     int (*write)(void *context, const canopy_can_frame_t *frame);
 } canopy_replay_io_t;
@@ -54,29 +53,23 @@ typedef struct {
      */
     canopy_clock_t clock;
     canopy_replay_io_t io;
-    canopy_trace_id_t inputs;
-    canopy_trace_id_t arrivals;
     canopy_can_conditions_t conditions;
-    canopy_time_t age;       /* of the frames that follow [us] */
-    canopy_can_frame_t next; /* read ahead, when `left` is 1 */
-    int left;                /* what the last read said */
+    canopy_replay_item_t next; /* read ahead, when `left` is 1 */
+    int left;                  /* what the last read said */
     canopy_time_t now;
     canopy_can_stats_t stats;
     canopy_error_t error;
 } canopy_replay_t;
 
 /**
- * Makes the pair, and reads the record's first frame: the loop's first deadline is its time.
+ * Makes the pair, and reads the record's first item: the loop's first deadline is its time.
  *
  * @param self   the object
  * @param io     copied; what its context points to lives longer than the pair
- * @param trace  the application's trace, with its CanopyInputs and CanopyArrivals: `app->trace`
- * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT: a NULL; CANOPY_ERROR_UNSUPPORTED: the application does not send both messages;
- *         CANOPY_ERROR_NOT_FOUND: the record does not begin with a CanopyInputs frame of this application; what read
- *         says. O(1).
+ * @return CANOPY_OK; CANOPY_ERROR_ARGUMENT: a NULL; CANOPY_ERROR_NOT_FOUND: the record does not begin with a tick; what
+ *         read says. O(1).
  */
-canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_t *io,
-                                  const canopy_trace_config_t *trace);
+canopy_error_t canopy_replay_init(canopy_replay_t *self, const canopy_replay_io_t *io);
 
 /** Why wait_until() gave false: what read or write said, or CANOPY_OK at the record's end. O(1). */
 canopy_error_t canopy_replay_error(const canopy_replay_t *self);

@@ -4,8 +4,13 @@
  * A replay from a file, and into one: canopy/clock/replay.h for programs on a desk. `canopy replay` makes the record and
  * reads what was sent.
  *
- * Both files hold frames as the unixbus writes them (docs/unixbus.md), one behind the other: 8 bytes of header, which
- * say how many bytes of data follow.
+ * A record begins with CANOPY_REPLAY_BEGIN. Its items follow one behind the other, numbers with the low byte first:
+ *
+ *   'T', the time of a tick [us] (8 bytes), CanState (1 byte, canopy_can_state_t), 1 * overload + 2 * returning (1 byte)
+ *   'F', the age of a frame [ms] (2 bytes), the frame
+ *
+ * Frames are as the unixbus writes them (docs/unixbus.md): 8 bytes of header, which say how many bytes of data follow. The
+ * file of what was sent holds frames alone.
  *
  * Threads: the loop's thread only. Reading and writing block as long as the file system does.
  */
@@ -16,6 +21,9 @@
 #include <stdio.h>
 
 #include "canopy/clock/replay.h"
+
+/** A record's first bytes, with the number of its version. */
+#define CANOPY_REPLAY_BEGIN "CANOPY RECORD 2\n"
 
 /** Bytes that every error's text fits into. */
 #define CANOPY_REPLAY_MESSAGE 512u
@@ -32,13 +40,12 @@ typedef struct {
  *
  * @param record  path of the record
  * @param sent    path of a new file for the frames that the controller sends, one that is there is overwritten; NULL: none
- * @param trace   the application's trace: `app->trace`
  * @param message receives one line for people when it fails: what was wrong, and the way out
  * @return CANOPY_OK; CANOPY_ERROR_NOT_FOUND, CANOPY_ERROR_IO: a file; or what canopy_replay_init() says. On an error all is
  *         closed.
  */
-canopy_error_t canopy_replay_open(canopy_replay_files_t *self, const char *record, const char *sent,
-                                  const canopy_trace_config_t *trace, char *message, size_t message_size);
+canopy_error_t canopy_replay_open(canopy_replay_files_t *self, const char *record, const char *sent, char *message,
+                                  size_t message_size);
 
 /**
  * Closes both files.
