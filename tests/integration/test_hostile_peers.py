@@ -116,7 +116,12 @@ def test_a_tool_lives_through_any_frames(bus_dir: Path, tmp_path: Path, name: st
         "sim": ["canopy_sim", "--dbc", str(DBC), "--no-lcm", "--json"],
     }[name]
     with noise("bus0", 7) as sent:
-        out, _ = endure(start(*command, "--can", "unixbus:bus0"), 5)
+        process = start(*command, "--can", "unixbus:bus0")
+        deadline = time.monotonic() + 60
+        while len(list((bus_dir / "bus0").glob(f"{process.pid}-*.sock"))) < 1:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        out, _ = endure(process, 4)
         assert sent() > 3000
     last = json.loads(out.splitlines()[-1])
     if name == "record":
@@ -201,7 +206,7 @@ for number in range(100_000):
         while not list(bus_dir.glob("bus0/*.sock")):
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        time.sleep(0.5)
+        time.sleep(1)
         subprocess.run(network.command([sys.executable, "-c", code]), check=True, timeout=60)
         out, _ = endure(process, 1)
     lcm = json.loads(out)["lcm"]
