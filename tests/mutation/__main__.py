@@ -23,6 +23,9 @@ _BUS = ("bus", "can_state", "loop", "trace", "tx")
 SLOW: dict[str, tuple[str, ...]] = {
     "test_conformance": _TREES,
     "test_tx_interleavings": ("tx",),
+    "test_tx_threads": ("tx",),
+    "test_ring_threads": ("ring",),
+    "test_unixbus_readers": (),
     **dict.fromkeys(("test_double_blocked", "test_double_controller", "test_double_fan", "test_double_states"), _BUS),
     **dict.fromkeys(("test_double_load_six", "test_double_load_nao_home", "test_double_load_nao_power"), ()),
     **dict.fromkeys(("test_power_supply", "test_plant", "test_unixbus", "test_posix_clock"), ()),
