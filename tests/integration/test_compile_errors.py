@@ -192,7 +192,7 @@ def test_a_deep_tree_compiles(tmp_path: Path) -> None:
         ('BA_DEF_DEF_ "GenSigInactiveValue" 0;', "", ["'PowerCommand.E2E_CRC'"]),
         ('BA_ "GenSigInactiveValue" SG_ 512 Mode 0;', 'BA_ "GenSigInactiveValue" SG_ 512 Mode 9;', ["its range"]),
         (" SG_ E2E_Counter : 8|4@1+ (1,0) [0|14] \"\" Robot\n SG_ Mode", " SG_ Mode", ["needs the signal E2E_Counter"]),
-        ("SG_ NodeB : 24|16@1+", "SG_ NodeB : 24|8@1+", ["message 'CanopyChange' must have", "NodeB 24|16@1+"]),
+        ("BO_ 512 PowerCommand:", "BO_ 512 CanopyTick:", ["node 'Controller' sends 'CanopyTick'", "--trace 0x600"]),
         ("BU_: Controller Robot", "BU_: Robot", ["no node 'Controller'", "known here: Robot"]),
         ("BO_ 256 Battery: 8 Robot", "BO_ 256 Battery", ["not a DBC that can be read"]),
     ],

@@ -81,7 +81,9 @@ def model(folder: Path) -> Path:
     nao = ROOT / "examples" / "nao"
     arguments = ["compile", str(nao / "trees" / "get_home.xml"), "--dbc", str(nao / "nao.dbc"), "--node", "Controller"]
     made = folder / "made"
-    result = CliRunner().invoke(main, [*arguments, "--period-ms", "50", "--name", "room", "-o", str(made)])
+    result = CliRunner().invoke(
+        main, [*arguments, "--period-ms", "50", "--trace", "0x600", "--name", "room", "-o", str(made)]
+    )
     assert result.exit_code == 0, result.output
     for name in ("room.model.json", "nao.dbc"):
         shutil.copy(made / name, folder / name)

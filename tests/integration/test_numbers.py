@@ -111,16 +111,20 @@ def test_a_cycle_of_65537_ticks_is_refused(tmp_path: Path) -> None:
     )
 
 
-def test_a_slow_trace_message_has_the_same_limit(tmp_path: Path) -> None:
-    health = "".join(
-        f' SG_ {name} : {16 * place}|16@1+ (1,0) [0|65535] "" B\n'
-        for place, name in enumerate(("RxRejected", "RxUnknown", "TxDropped", "Faults"))
-    )
-    dbc = (
-        DBC.replace("BO_ 2 S", f"BO_ 3 CanopyHealth: 8 Controller\n{health}\nBO_ 2 S")
-        + 'BA_ "GenMsgCycleTime" BO_ 3 6553600;\n'
-    )
-    expect_refused(tmp_path, run(tmp_path, dbc=dbc), "b.dbc", "GenMsgCycleTime of message 'CanopyHealth'")
+@pytest.mark.parametrize(
+    ("option", "value", "text"),
+    [
+        ("--trace", "-1", "-1 is not between 0x0 and 0x1FFFFFF8"),
+        ("--trace", "0x1FFFFFF9", "0x1FFFFFF9 is not between"),
+        ("--trace", "9" * 30, "is not between"),
+        ("--trace", "tick", "'tick' is no number; for example 0x600"),
+        ("--trace-guard", "0x10000", "0x10000 is not between 0x0 and 0xFFFF"),
+    ],
+)
+def test_an_option_of_the_trace_has_limits(tmp_path: Path, option: str, value: str, text: str) -> None:
+    result = run(tmp_path, *(["--trace", "0x600"] if option != "--trace" else []), option, value)
+    assert result.exit_code == 2
+    assert text in " ".join(result.stderr.replace("│", "").split()), result.stderr
 
 
 @pytest.mark.parametrize(

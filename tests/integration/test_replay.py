@@ -15,8 +15,6 @@ import pytest
 from click.testing import CliRunner, Result
 
 from canopy.cli import main
-from canopy.model import load_model
-from canopy.replay.log import read_recording
 from integration import logs
 
 TICKS = 220
@@ -157,19 +155,6 @@ def test_several_runs(replay: Callable[..., Result], log: Log) -> None:
     assert (second.exit_code, data["run"], data["runs"], data["equal"]) == (0, 2, 2, True)
     assert 100 < data["ticks"] < TICKS
     refused(replay(twice, "--run", "3"), "has 2 runs of the controller, and no run 3")
-
-
-def test_a_tick_number_that_wraps_around_is_no_start(build_dir: Path, log: Log, tmp_path: Path) -> None:
-    """Tick numbers moved so that 0 comes again where the sequence number is 0, too."""
-    first, sequence = 100, log[place_of(log, TICK, 100)].data[6]
-    for message in log:
-        byte = 6 if message.arbitration_id == TICK else 0
-        if message.arbitration_id in (TICK, CHANGE, SNAPSHOT):
-            message.data[byte] = message.data[byte] & 0xC0 | (message.data[byte] - sequence) % 64
-        if message.arbitration_id == TICK:
-            message.data[2:6] = ((tick_number(message) - first) % 2**32).to_bytes(4, "little")
-    recording = read_recording(logs.write_log(tmp_path / "x.log", log), load_model(model_file(build_dir)))
-    assert (recording.runs, recording.joined) == ([], 2**32 - first)
 
 
 # --- what is not ------------------------------------------------------------------------------------------------------
@@ -411,41 +396,3 @@ def test_an_error_is_json_when_asked_for(replay: Callable[..., Result], log: Log
     data = json.loads(result.stdout)
     assert (result.exit_code, data["equal"]) == (1, False)
     assert "in the middle of its run" in data["error"]
-
-
-def test_a_log_of_two_buses(replay: Callable[..., Result], log: Log) -> None:
-    other = copy.deepcopy(log)
-    for message in other:
-        message.channel = "can1"
-    mixed = [message for pair in zip(log, other, strict=True) for message in pair]
-    refused(replay(mixed), "has frames of several buses (can0, can1): choose with --channel")
-    assert replay(mixed, "--channel", "can1").exit_code == 0
-
-
-def test_a_log_of_an_older_version_is_refused_with_a_way_out(replay: Callable[..., Result], log: Log) -> None:
-    for message in log:
-        if message.arbitration_id == TICK:  # Sequence, Tick, RootStatus, Changes, Overruns
-            message.data = bytearray([message.data[6] & 0x3F, *message.data[2:6], message.data[7] & 7, 0, 0])
-    place = next(i for i, m in enumerate(log) if m.arbitration_id == TICK)
-    refused(
-        replay(log),
-        f"run.log: frame {place + 1} is no CanopyTick of trace version 2, but of version 0, or of an older one",
-        "replay this log with the release of Canopy that recorded it, and with the program and the model file of then",
-    )
-
-
-def test_the_upper_bits_of_the_time(replay: Callable[..., Result], log: Log) -> None:
-    """CanopyModel has them. Where it is missing the lower bits go on, and the next one shows whether that was right."""
-    model = [i for i, m in enumerate(log) if m.arbitration_id == MODEL and m.data[0] == 0x21]
-    assert len(model) > 10
-    left = [m for i, m in enumerate(log) if i != model[3]]
-    differs(replay(left, "--json"), tick_before(log, model[3]))  # it is missing, and was not counted
-    spoilt = copy.deepcopy(log)
-    spoilt[model[5]].data[4] += 1
-    result = replay(spoilt)
-    refused(result, f"the time of tick {tick_before(log, model[6])} is not known: CanopyModel frames are missing")
-    refused(
-        replay([m for m in log if m.arbitration_id != MODEL]),
-        "the time of tick 0 is not known: CanopyModel frames are missing",
-        "record again",
-    )

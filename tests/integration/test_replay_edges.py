@@ -15,6 +15,8 @@ from click.testing import CliRunner, Result
 from e2e.p11 import e2e_p11_protect
 
 from canopy.cli import main
+from canopy.model import load_model
+from canopy.replay.log import read_recording
 from integration import logs
 from integration.test_replay import (
     ARRIVALS,
@@ -27,12 +29,14 @@ from integration.test_replay import (
     POWER_COMMAND,
     SNAPSHOT,
     TICK,
+    TRACE,
     Log,
     differs,
     flip,
     model_file,
     place_of,
     refused,
+    tick_before,
     tick_number,
 )
 
@@ -195,6 +199,72 @@ def test_many_frames_in_a_tick(build_dir: Path, tmp_path: Path, replay: Callable
     log = [message for step, answer in zip(steps, sent, strict=False) for message in (*step.frames, *answer)]
     data = is_equal(replay(logs.stamped(log), "--json"))
     assert (data["ticks"], data["inputs"]) == (len(steps), 2 + 1 + 300 + 1 + 256 + 2 + 520 + 9)
+
+
+# --- versions, times, and other trees ------------------------------------------------------------------------------
+
+
+def test_the_trace_of_another_tree_plays_no_part(replay: Callable[..., Result], log: Log) -> None:
+    """A second controller on the bus, with trace ids of its own, in other ticks than this one."""
+    other = copy.deepcopy([message for message in log if message.arbitration_id in TRACE])
+    for message in other:
+        message.arbitration_id += 0x10
+    mixed = [message for i, own in enumerate(log) for message in (own, *other[i + 100 : i + 101])]
+    assert len(mixed) > len(log) + 500
+    result = replay(logs.stamped(mixed), "--json")
+    assert result.exit_code == 0, (result.output, result.exception)
+    assert json.loads(result.stdout)["ticks"] == TICKS
+
+
+def test_a_tick_number_that_wraps_around_is_no_start(build_dir: Path, log: Log, tmp_path: Path) -> None:
+    """Tick numbers moved so that 0 comes again where the sequence number is 0, too."""
+    first, sequence = 100, log[place_of(log, TICK, 100)].data[6]
+    for message in log:
+        byte = 6 if message.arbitration_id == TICK else 0
+        if message.arbitration_id in (TICK, CHANGE, SNAPSHOT):
+            message.data[byte] = message.data[byte] & 0xC0 | (message.data[byte] - sequence) % 64
+        if message.arbitration_id == TICK:
+            message.data[2:6] = ((tick_number(message) - first) % 2**32).to_bytes(4, "little")
+    recording = read_recording(logs.write_log(tmp_path / "x.log", log), load_model(model_file(build_dir)))
+    assert (recording.runs, recording.joined) == ([], 2**32 - first)
+
+
+def test_a_log_of_an_older_version_is_refused_with_a_way_out(replay: Callable[..., Result], log: Log) -> None:
+    for message in log:
+        if message.arbitration_id == TICK:  # Sequence, Tick, RootStatus, Changes, Overruns
+            message.data = bytearray([message.data[6] & 0x3F, *message.data[2:6], message.data[7] & 7, 0, 0])
+    place = next(i for i, m in enumerate(log) if m.arbitration_id == TICK)
+    refused(
+        replay(log),
+        f"run.log: frame {place + 1} is no CanopyTick of trace version 2, but of version 0, or of an older one",
+        "replay this log with the release of Canopy that recorded it, and with the program and the model file of then",
+    )
+
+
+def test_the_upper_bits_of_the_time(replay: Callable[..., Result], log: Log) -> None:
+    """CanopyModel has them. Where it is missing the lower bits go on, and the next one shows whether that was right."""
+    model = [i for i, m in enumerate(log) if m.arbitration_id == MODEL and m.data[0] == 0x21]
+    assert len(model) > 10
+    left = [m for i, m in enumerate(log) if i != model[3]]
+    differs(replay(left, "--json"), tick_before(log, model[3]))  # it is missing, and was not counted
+    spoilt = copy.deepcopy(log)
+    spoilt[model[5]].data[4] += 1
+    result = replay(spoilt)
+    refused(result, f"the time of tick {tick_before(log, model[6])} is not known: CanopyModel frames are missing")
+    refused(
+        replay([m for m in log if m.arbitration_id != MODEL]),
+        "the time of tick 0 is not known: CanopyModel frames are missing",
+        "record again",
+    )
+
+
+def test_a_log_of_two_buses(replay: Callable[..., Result], log: Log) -> None:
+    other = copy.deepcopy(log)
+    for message in other:
+        message.channel = "can1"
+    mixed = [message for pair in zip(log, other, strict=True) for message in pair]
+    refused(replay(mixed), "has frames of several buses (can0, can1): choose with --channel")
+    assert replay(mixed, "--channel", "can1").exit_code == 0
 
 
 # --- commands that have not left --------------------------------------------------------------------------------------

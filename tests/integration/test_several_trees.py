@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import can
@@ -87,12 +87,10 @@ def test_each_tree_sends_at_its_own_rate_and_is_watched_by_its_own_trace(
         assert (decoder.lost, decoder.refused) == (0, 0)
 
 
-def test_the_model_names_the_trace_messages_of_its_node(build_dir: Path) -> None:
-    kinds = ("CanopyTick", "CanopyChange", "CanopySnapshot", "CanopyHealth")
-    for name, first in (("driver", 0x600), ("navigator", 0x610)):
+def test_the_model_names_the_trace_of_its_node(build_dir: Path) -> None:
+    for name, base in (("driver", 0x600), ("navigator", 0x610)):
         data = json.loads(model_file(build_dir, name).read_text())
-        more = {"CanopyInputs": 0x614, "CanopyModel": 0x615, "CanopyArrivals": 0x616} if name == "navigator" else {}
-        assert data["trace"] == {kind: first + place for place, kind in enumerate(kinds)} | more
+        assert (data["trace"]["base"], data["trace"]["extended"]) == (base, False)
         assert not any("Canopy" in message for message in data["bus"]["send"] + data["bus"]["receive"])
 
 
@@ -102,42 +100,49 @@ def compile_c(tmp_path: Path, file: str) -> None:
     subprocess.run([*command, str(tmp_path / "out" / file)], check=True)
 
 
-def compile_driver(tmp_path: Path, text: str, tree: Path = SEVERAL / "driver.xml") -> tuple[int, str]:
+def compile_driver(
+    tmp_path: Path, text: str, tree: Path = SEVERAL / "driver.xml", options: Sequence[str] = ()
+) -> tuple[int, str]:
     (tmp_path / "rover.dbc").write_text(text)
     arguments = ["compile", str(tree), "--dbc", str(tmp_path / "rover.dbc"), "--node", "Driver"]
-    result = CliRunner().invoke(main, [*arguments, "--period-ms", "10", "-o", str(tmp_path / "out")])
+    result = CliRunner().invoke(main, [*arguments, "--period-ms", "10", "-o", str(tmp_path / "out"), *options])
     return result.exit_code, result.stderr
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "texts"),
-    [
-        (
-            "CanopyTick_Navigator: 8 Navigator",
-            "CanopyTick_Navigator: 8 Driver",
-            ["node 'Driver' sends both 'CanopyTick' and 'CanopyTick_Navigator'", "its own"],
-        ),
-        ("Changes : 48|8@1+ (1,0) [0|255]", "Changes : 48|7@1+ (1,0) [0|127]", ["'CanopyTick' must have 8 bytes"]),
-    ],
-)
-def test_wrong_trace_messages_are_named(tmp_path: Path, old: str, new: str, texts: list[str]) -> None:
-    text = DBC.read_text()
-    assert old in text
-    code, errors = compile_driver(tmp_path, text.replace(old, new))
+OLD_TICK = 'BO_ {} CanopyTick{}: 8 {}\n SG_ Tick : 8|32@1+ (1,0) [0|4294967295] "" {}\n\nBO_ 256 Wheels'
+
+
+@pytest.mark.parametrize("name", ["", "_Mine"])
+def test_trace_messages_that_the_dbc_still_has_are_named(tmp_path: Path, name: str) -> None:
+    text = DBC.read_text().replace("BO_ 256 Wheels", OLD_TICK.format(1600, name, "Driver", "Base"))
+    code, errors = compile_driver(tmp_path, text)
     assert code == 2
-    for part in texts:
-        assert part in errors
+    line = text[: text.index("BO_ 1600")].count("\n") + 1
+    assert f"rover.dbc:{line}:" in errors
+    assert f"node 'Driver' sends 'CanopyTick{name}', and the trace's messages are made by the compiler" in errors
+    assert "take the Canopy messages out of the DBC, and give --trace 0x600 (in CMake: TRACE 0x600)" in errors
+
+
+def test_ids_that_the_dbc_has_are_not_the_traces(tmp_path: Path) -> None:
+    text = DBC.read_text().replace("BO_ 256 Wheels", OLD_TICK.format(0x607, "_Navigator", "Navigator", "Base"))
+    code, errors = compile_driver(tmp_path, text, options=["--trace", "0x600"])
+    assert code == 2
+    assert "the trace takes the ids 0x600 to 0x607, and 0x607 is 'CanopyTick_Navigator' of rover.dbc" in errors
+    assert "take eight ids in a row that are free" in errors
+    assert compile_driver(tmp_path, text, options=["--trace", "0x608"])[0] == 0
+    assert compile_driver(tmp_path, text, options=["--trace", "0x800"])[0] == 0  # 29-bit ids
+    code, errors = compile_driver(tmp_path, text, options=["--trace", "0x7F9"])
+    assert code == 2
+    assert "the trace takes the ids 0x7F9 to 0x800, which are no CAN ids" in errors
 
 
 def test_a_trace_message_of_another_node_is_an_input_like_any_other(tmp_path: Path) -> None:
-    text = DBC.read_text()
-    old = 'SG_ Tick : 8|32@1+ (1,0) [0|4294967295] "" Base'
-    assert text.count(old) == 2
-    code, errors = compile_driver(tmp_path, text.replace(old, old + ",Driver"))
+    text = DBC.read_text().replace("BO_ 256 Wheels", OLD_TICK.format(0x610, "_Navigator", "Navigator", "Driver"))
+    code, errors = compile_driver(tmp_path, text, options=["--trace", "0x600"])
     assert code == 0, errors
     data = json.loads((tmp_path / "out" / "driver.model.json").read_text())
     assert "CanopyTick_Navigator" in data["bus"]["receive"]
-    assert data["trace"]["CanopyTick"] == 0x600
+    assert data["trace"]["base"] == 0x600
 
 
 def test_names_of_the_bus_do_not_meet_those_of_the_application(tmp_path: Path) -> None:

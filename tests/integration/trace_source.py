@@ -15,6 +15,8 @@ import cantools
 from cantools.database.can import Database
 from e2e.p11 import e2e_p11_protect
 
+from canopy.model import Model, load_model
+
 DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
 BASE = 0x600
 NAMES = (
@@ -172,6 +174,15 @@ def write_model(folder: Path, nodes: int = 4, **trace: Any) -> Path:
     data["trace"] |= trace
     path.write_text(json.dumps(data), encoding="utf-8")
     return path
+
+
+def models_by_size(folder: Path, sizes: Sequence[int]) -> dict[int, Model]:
+    """Models with so many nodes, and those of more than one with NUMBERS."""
+    made = {}
+    for nodes in sizes:
+        (folder / str(nodes)).mkdir()
+        made[nodes] = load_model(write_model(folder / str(nodes), nodes, values=NUMBERS if nodes > 1 else []))
+    return made
 
 
 def database() -> Database:

@@ -48,6 +48,9 @@ def document(body: str) -> str:
     models = '<Condition ID="Check"/><Action ID="Act"/><Action ID="Do"/>'
     told = '<input_port name="speed"/><MetadataFields><Metadata returns="SUCCESS"/></MetadataFields>'
     models += f'<Action ID="Told">{told}</Action>'
+    port = '<output_port name="n" type="int32_t"/><MetadataFields><Metadata kind='
+    models += f'<Action ID="Count">{port}"SyncAction"/></MetadataFields></Action>'
+    models += f'<Action ID="Drive">{port}"StatefulAction"/></MetadataFields></Action>'
     return (
         f'<root BTCPP_format="4"><BehaviorTree ID="T">{body}</BehaviorTree>'
         f"<TreeNodesModel>{models}</TreeNodesModel></root>\n"

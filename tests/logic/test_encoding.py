@@ -25,9 +25,9 @@ def test_every_node_in_every_tick(period_us: int | None) -> None:
         given = [{one: chance.random() < 0.5 for one in encoding.circuit.inputs} for _ in range(TICKS)]
         inputs, expected = from_circuit(encoding, given)
         replay = Replay(root, period_us)
-        for tick, (one, moments) in enumerate(zip(inputs, expected, strict=True)):
+        for tick, (one, shot) in enumerate(zip(inputs, expected, strict=True)):
             got = replay.tick(one)
-            for index, (cell, real) in enumerate(zip(moments, got, strict=True)):
+            for index, (cell, real) in enumerate(zip(shot.moments, got.moments, strict=True)):
                 assert cell == real, f"tree {number}, tick {tick}, node {index} <{encoding.cells[index].spec.kind}>"
         seen |= {spec.kind for spec in root.walk()}
     assert seen == set(CELLS) & set(SHAPES)

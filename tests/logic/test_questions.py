@@ -14,7 +14,7 @@ from canopy.verify.logic.ask import decided
 from canopy.verify.logic.encode import CELLS, Encoding
 from canopy.verify.logic.formula import ATOMS, OPERATORS, Formula
 from canopy.verify.logic.monitor import holds, literal
-from canopy.verify.logic.replay import Inputs, Moment, Replay, from_circuit
+from canopy.verify.logic.replay import Inputs, Replay, Shot, from_circuit
 from differential.tree import SCRIPTED, SHAPES
 from logic.random_trees import random_returns, random_specs
 
@@ -48,7 +48,7 @@ def everything(returns: dict[int, tuple[int, ...]]) -> Iterator[Inputs]:
         yield Inputs(dict(zip(returns, answers, strict=True)), {})
 
 
-def all_moments(root: Spec, returns: dict[int, tuple[int, ...]]) -> list[list[Moment]] | None:
+def all_shots(root: Spec, returns: dict[int, tuple[int, ...]]) -> list[Shot] | None:
     """What any tick of any run can look like; None: too many states."""
     machine = Machine(root, 1)
     waiting = [machine.save()]
@@ -94,12 +94,12 @@ def test_invariants_by_exhaustive_search() -> None:
             cases *= len(statuses)
         if nodes < 3 or cases > MOST_CASES:
             continue
-        moments = all_moments(root, returns)
-        if moments is None:
+        shots = all_shots(root, returns)
+        if shots is None:
             continue
         for _ in range(2):
             formula = Formula("not", (Formula("and", (atom(chance, nodes), atom(chance, nodes))),))
-            expected = "proven" if all(holds(formula, [one])[0] for one in moments) else "refuted"
+            expected = "proven" if all(holds(formula, [one])[0] for one in shots) else "refuted"
             assert decided(root, returns, formula, None, 30.0).verdict == expected, f"tree {number}: {formula}"
             verdicts[expected] += 1
         if sum(verdicts.values()) >= WANTED:

@@ -82,7 +82,7 @@ WRONG = {
         "[leaves.SitToStand]",
         "[[leaves.WalkHome.modes]]\nnext = {}\n\n[leaves.SitToStand]",
         "two modes of leaf 'WalkHome' hold at",
-        "let 'when' divide them",
+        "let 'when' or 'where' divide them",
         "[[leaves.WalkHome.modes]]\nnext = {}",
     ),
     "a leaf that the tree has not": (

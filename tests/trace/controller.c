@@ -137,7 +137,7 @@ void controller_make(controller_t *self, uint64_t seed, const controller_mood_t 
     if (flat > 0) {
         ref_make_flat(&self->ref, flat);
     } else {
-        ref_make(&self->ref, &self->random, NODES_MAX);
+        ref_make(&self->ref, &self->random, random_chance(&self->random, 30) ? NODES_MAX : 200u);
     }
     make_tables(self);
     self->config = (canopy_trace_config_t){
@@ -162,7 +162,9 @@ void controller_start(controller_t *self, uint32_t number)
     const canopy_tx_memory_t memory = {.trace = self->ring, .trace_capacity = RING};
 
     ref_start(&self->ref);
-    memset(&self->state, 0, sizeof self->state);
+    memset(&self->state, 0xA5, sizeof self->state); /* of the run before */
+    memset(self->sent, 0xA5, sizeof self->sent);
+    memset(self->told, 0xA5, sizeof self->told);
     memset(self->rx, 0, sizeof self->rx);
     self->state.sent = self->sent;
     self->state.told = self->told;

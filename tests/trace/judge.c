@@ -175,10 +175,6 @@ static void show(void *context, const decoder_t *decoder)
     }
     judge_inputs(self, truth);
     judge_whole(self, truth);
-    for (uint16_t i = 0; i < self->model.node_count; i++) {
-        self->tally->since_exact += self->nodes[i].is_certain && self->nodes[i].is_since_exact ? 1u : 0u;
-        self->tally->since_open += self->nodes[i].is_certain && !self->nodes[i].is_since_exact ? 1u : 0u;
-    }
     self->has_shown = true;
     self->last_shown = self->tick;
     self->tally->shown++;
@@ -280,6 +276,19 @@ static void judge_sequence(judge_t *self, const uint8_t *data, uint64_t tick)
     self->sent = sequence;
 }
 
+/** CanopyTick's E2E counter: 0 to 14, one more in each tick. (The CRC is looked at by the other decoder.) */
+static void judge_guard(judge_t *self, const uint8_t *data)
+{
+    uint8_t counter = data[1] & 0x0Fu;
+
+    if (self->controller->config.data_id == CANOPY_E2E_NONE) {
+        CHECK(counter == 0 && data[0] == 0);
+    } else {
+        CHECK(self->has_sent ? counter == (self->counter + 1u) % 15u : counter < 15u);
+    }
+    self->counter = counter;
+}
+
 void judge_tick(judge_t *self)
 {
     const controller_t *controller = self->controller;
@@ -299,6 +308,12 @@ void judge_tick(judge_t *self)
         bool has_sequence = message == 0 || message == 3u || message == 4u;
 
         self->tally->frames++;
+        for (unsigned byte = message == 2u ? 1u + (frame.data[0] >> 4 & 7u) : 8u; byte < 8u; byte++) {
+            CHECK(frame.data[byte] == 0); /* not used by CanopyArrivals */
+        }
+        if (message == 0 && controller->mood.bus_frames == 0) {
+            judge_guard(self, frame.data);
+        }
         if (has_sequence && controller->mood.bus_frames == 0) {
             judge_sequence(self, &frame.data[message == 0 ? 6 : 0], tick);
         }

@@ -29,7 +29,6 @@ typedef struct {
     uint64_t wrong; /**< Shown as certain; with judge_t.only_counts. Else one ends the program. */
     uint64_t nodes_certain, nodes_old, nodes_unknown;
     uint64_t slots_certain, slots_old, slots_unknown;
-    uint64_t since_exact, since_open;
     uint64_t inputs;
     uint32_t known_after; /**< Most ticks from a loss until all nodes and slots were known. */
     uint32_t promised;    /**< Of that controller. */
@@ -58,6 +57,7 @@ typedef struct {
     uint32_t dropped; /**< By the controller, so far. */
     bool has_sent;
     uint8_t sent;        /**< Sequence of the controller's last frame that has one. */
+    uint8_t counter;     /**< E2E counter of its last CanopyTick. */
     uint64_t lost_since; /**< Frames with a Sequence that the channel has lost since the last CanopyTick that came, */
     uint64_t lost_told;  /**< and before it, as far as a receiver can know. */
     bool is_lost_less;   /**< 64 and more at once: Sequence shows less. */

@@ -14,7 +14,7 @@
 #include "canopy/status.h"
 #include "random.h"
 
-enum { NODES_MAX = 200, DEPTH_MAX = 8 };
+enum { NODES_MAX = 1000, DEPTH_MAX = 8 };
 
 typedef enum {
     REF_LEAF, /**< A StatefulAction. */

@@ -16,6 +16,9 @@ Rows = list[Row]
 Inside = Callable[[Rows, int], int]
 """Which member of the backward set, of this piece, holds all solutions of the rows; -1: there are no solutions."""
 
+CLAIM_KEYS = ("name", "kind", "of", "arbitrary", "disturbance", "expect", "from", "within", "avoid")
+"""What a claim may say; anything else might change what it means."""
+
 
 @dataclass(frozen=True)
 class Open:
@@ -94,6 +97,9 @@ class Claim:
         self.kind = self.options["kind"]
         if self.kind not in ("reaches", "avoids") or "goal" in self.options:
             raise RejectedError(f"claims of kind '{self.kind}', or with a goal of their own, have no certificates")
+        unknown = [key for key in self.options if key not in CLAIM_KEYS]
+        if unknown:
+            raise RejectedError(f"claims with the key '{unknown[0]}' have no certificates")
         self.width = files.width
         self.builder = Builder(files, self.options)
         self.pieces = self.builder.pieces()

@@ -296,7 +296,8 @@ class Builder:
                 (low + a, high + b) if sums[i] != still[i] or low or high or shorter[i] is not None else (low, high)
                 for i, ((low, high), (a, b)) in enumerate(zip(noise, self.added, strict=True))
             )
-            result.append((self.reader.condition(mode.get("when", "true")), Step(sums, moved, shorter)))
+            conditions = (self.reader.condition(mode.get(key, "true")) for key in ("when", "where"))
+            result.append((meet(*conditions), Step(sums, moved, shorter)))
         return result
 
     def _noise(

@@ -67,6 +67,9 @@ class Slots:
         self._told: set[int] = set()
         """In the tick at hand."""
         self._more = False
+        self._states: tuple[ValueState, ...] = ()
+        self._is_settled = False
+        """All that is known was certain of the last tick: so it is of the next, when that tells nothing else."""
 
     def begin(self) -> None:
         """A tick begins."""
@@ -90,11 +93,13 @@ class Slots:
     def know(self) -> None:
         """The controller has just started: everything is 0."""
         self._bits = [0] * len(self._bits)
+        self._is_settled = False
 
     def forget(self) -> None:
         """Nothing is known."""
         self._bits = [None] * len(self._bits)
         self._told.clear()
+        self._is_settled = False
 
     def end(self, complete: bool) -> tuple[ValueState, ...]:
         """The values when a tick is over.
@@ -103,10 +108,13 @@ class Slots:
             complete: All CanopyValue that were announced have come.
         """
         all_told = complete and not self._more
-        states = tuple(self._state(value, all_told) for value in self._trace.values)
+        if self._told or not (all_told and self._is_settled):
+            self._states = tuple(self._state(value, all_told) for value in self._trace.values)
+            self._is_settled = all_told
         if not complete:
             self._bits = [bits if slot in self._told else None for slot, bits in enumerate(self._bits)]
-        return states
+            self._is_settled = False
+        return self._states
 
     def _state(self, value: TraceValue, all_told: bool) -> ValueState:
         slots = range(value.slot, value.slot + value.slots)

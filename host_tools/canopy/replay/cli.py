@@ -117,7 +117,7 @@ def _show(log: Path, model: Model, options: Options, replayed: Replayed) -> None
     if not result.differences:
         dropped = f"; {result.dropped} more did not leave, as CanopyHealth has counted" if result.dropped else ""
         unheard = f"; {replayed.unheard} never reached the controller" if replayed.unheard else ""
-        uncounted = f"; {result.uncounted} are missing behind the last count of such" if result.uncounted else ""
+        uncounted = f"; {result.uncounted} are missing too late in the log to be counted" if result.uncounted else ""
         equal = f"{result.ticks} ticks replayed, {result.frames} frames compared: all equal"
         echo(f"{name}: {equal}{dropped}{uncounted}{unheard}")
         return

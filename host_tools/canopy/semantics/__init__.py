@@ -61,6 +61,7 @@ from canopy.semantics.scripts import (
     SetBlackboard,
     SkipUnlessUpdated,
     Switch,
+    TestNode,
     WaitValueUpdate,
     WasEntryUpdated,
 )
@@ -109,6 +110,7 @@ __all__ = [
     "StatefulAction",
     "Switch",
     "SyncAction",
+    "TestNode",
     "Timeout",
     "TryCatch",
     "UserLeaf",
@@ -128,7 +130,7 @@ NODES: dict[str, type[Node]] = {
         Inverter, ForceSuccess, ForceFailure, Repeat, RetryUntilSuccessful, KeepRunningUntilFailure,
         Delay, Timeout, RunOnce,
         Script, ScriptCondition, SetBlackboard, Precondition, Attributes, SkipUnlessUpdated, WaitValueUpdate,
-        WasEntryUpdated, Loop, Switch,
+        WasEntryUpdated, Loop, Switch, TestNode,
     )
 }  # fmt: skip
 

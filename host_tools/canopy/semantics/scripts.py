@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from canopy.semantics.decorators import Decorator
-from canopy.semantics.node import COMPLETED, Node
+from canopy.semantics.node import COMPLETED, Node, reached
 from canopy.semantics.spec import ATTRIBUTES, FAILURE, RUNNING, SKIPPED, SUCCESS
 
 
@@ -23,6 +23,22 @@ class SetBlackboard(Script):
 class ScriptCondition(Node):
     def tick_children(self) -> int:
         return SUCCESS if self.world.run(self.spec.scripts[0]) else FAILURE
+
+
+class TestNode(Node):
+    """Parameters: the status, and the time in ms. Its scripts are those of TEST_SCRIPTS."""
+
+    def tick_children(self) -> int:
+        status, milliseconds = self.spec.parameters
+        if self.code != RUNNING:
+            self.deadline = self.world.now + 1000 * milliseconds
+        if not reached(self.world.now, self.deadline):
+            return RUNNING
+        on_success, on_failure, post = self.spec.scripts
+        if status in COMPLETED:
+            self.world.run(on_success if status == SUCCESS else on_failure)
+        self.world.run(post)
+        return status
 
 
 class Precondition(Decorator):

@@ -18,6 +18,8 @@ CALL_NAMES = ("start", "running", "halted")
 
 ATTRIBUTES = ("_failureIf", "_successIf", "_skipIf", "_while", "_onSuccess", "_onFailure", "_post", "_onHalted")
 
+TEST_SCRIPTS = ("success_script", "failure_script", "post_script")
+
 COMPARISONS = ("<", "==")
 
 

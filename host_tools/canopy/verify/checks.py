@@ -97,14 +97,14 @@ def _check_declared(plant: Plant, leaf: LeafModel, node: Node, domain: Formula) 
 
 def _check_modes(plant: Plant, leaf: LeafModel, acts: Formula) -> None:
     for one, other in combinations(leaf.modes, 2):
-        point = (one.when & other.when & acts).point()
+        point = (one.when & one.where & other.when & other.where & acts).point()
         if point is not None:
             raise plant.error(
                 other.place,
                 f"two modes of leaf '{leaf.id}' hold at {plant.shown(point)}",
-                f"the other one begins at {one.place}: let 'when' divide them",
+                f"the other one begins at {one.place}: let 'when' or 'where' divide them",
             )
-    point = _outside(acts, [mode.when for mode in leaf.modes])
+    point = _outside(acts, [mode.when & mode.where for mode in leaf.modes])
     if point is not None:
         raise plant.error(
             leaf.place,
@@ -112,7 +112,7 @@ def _check_modes(plant: Plant, leaf: LeafModel, acts: Formula) -> None:
             f"write [[leaves.{leaf.id}.modes]] with next or shorter_than; next = {{}} stands still",
         )
     for mode in leaf.modes:
-        _check_closed(plant, leaf, mode, acts & mode.when)
+        _check_closed(plant, leaf, mode, acts & mode.when & mode.where)
 
 
 def leak(piece: Piece, domain: Polyhedron) -> tuple[State, State] | None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal
 
 from canopy.compiler.tree import Tree
 from canopy.verify import smt
 from canopy.verify.invariant import Invariant, directions
-from canopy.verify.linear import Formula
+from canopy.verify.linear import Formula, State, everything, nothing
+from canopy.verify.local import leaves_set, sliding
 from canopy.verify.margin import distance
 from canopy.verify.model import Claim, Plant, number
 from canopy.verify.question import Question, ask
@@ -38,6 +39,8 @@ class Result:
     steps: list[str] = field(default_factory=list)
     seconds: float = 0.0
     bound: Fraction | None = None
+    endless: bool = False
+    """Refuted by a run that never ends, of which the trace shows the beginning."""
 
     @property
     def expected(self) -> bool:
@@ -58,10 +61,25 @@ def decide(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree, seconds:
         "avoids": _avoids,
         "margin": _margin,
         "dwell": _dwell,
+        "invariant": _invariant,
+        "border": _border,
     }
-    result = methods[claim.kind](ask(claim, plant, reader, tree, seconds))
+    question = ask(claim, plant, reader, tree, seconds)
+    result = _checked(question, methods[claim.kind](question))
     result.seconds = time.monotonic() - begin
     return result
+
+
+def _checked(question: Question, result: Result) -> Result:
+    """What refutes a claim about old measurements has to be a run in which each of them is one of the past."""
+    sensing = question.sensing
+    if sensing is None or sensing.is_exact or result.verdict != "refuted":
+        return result
+    can_happen = bool(result.trace) and not result.endless
+    if can_happen and sensing.explains(result.trace, question.measured, question.system.domain):
+        return result
+    text = f"{result.text}; that may need older measurements than there are"
+    return replace(result, verdict="unknown", text=text)
 
 
 def _reaches(question: Question) -> Result:
@@ -74,7 +92,7 @@ def _reaches(question: Question) -> Result:
     if worst is None:
         return Result(claim, "proven", "every start is at the goal", "one step", bound=Fraction(0))
     if not worst.ended and not worst.cut:
-        return Result(claim, "refuted", f"this run never ends: {worst.why}", "simulation", worst.visits)
+        return Result(claim, "refuted", f"this run never ends: {worst.why}", "simulation", worst.visits, endless=True)
     least = len(worst.visits) - 1
     if within is not None and least > within:
         text = f"from {question.plant.shown(worst.visits[0].state)} it takes {least} steps"
@@ -106,7 +124,7 @@ def _unrolled(question: Question, found: Found, within: int | None) -> Result:
         text = f"within {found.steps} steps, and as many are needed"
         return Result(claim, "proven", text, "unrolling", found.trace, steps, bound=Fraction(found.steps))
     if found.endless:
-        return Result(claim, "refuted", f"from {shown} some run never ends", "unrolling", found.trace)
+        return Result(claim, "refuted", f"from {shown} some run never ends", "unrolling", found.trace, endless=True)
     return Result(claim, "unknown", f"no bound found, and no run longer than {found.steps}: {found.note}", "unrolling")
 
 
@@ -198,3 +216,44 @@ def _dwell(question: Question) -> Result:
         return Result(question.claim, "unknown", text, "unrolling")
     text = f"every visit between two others lasts {at_least} steps or more"
     return Result(question.claim, "proven", text, "unrolling")
+
+
+def _invariant(question: Question) -> Result:
+    """A given set: every start is in it, no step leads out of it, and nothing in it is bad."""
+    claim, system = question.claim, question.system
+    kept = question.formula("holds")
+    bad = question.formula("avoid") if "avoid" in claim.options else nothing(system.width)
+    outside = (question.start & ~kept).point()
+    if outside is not None:
+        text = f"the start {question.plant.shown(outside)} is not in it"
+        return Result(claim, "refuted", text, "one step", _at(system, outside))
+    inside = (kept & bad & Formula(system.width, (system.domain,))).point()
+    if inside is not None:
+        text = f"it has {question.plant.shown(inside)}, which is to be avoided"
+        return Result(claim, "refuted", text, "one step", _at(system, inside))
+    leak, steps = leaves_set(system, kept)
+    if leak is not None:
+        places = ((leak.state, leak.piece), (leak.after, leak.target))
+        pieces = [(state, system.pieces[index]) for state, index in places]
+        visits = tuple(Visit(state, piece.label, piece.status) for state, piece in pieces)
+        return Result(claim, "refuted", "this step leads out of it", "one step", visits)
+    steps += [smt.held_by(part, kept) for part in question.start.parts]
+    steps += [smt.meets(one, part.meet(system.domain)) for one in kept.parts for part in bad.parts]
+    return Result(claim, "proven", "no step leads out of it", "one step", (), steps)
+
+
+def _at(system: System, state: State) -> tuple[Visit, ...]:
+    """A moment in a state."""
+    return tuple(Visit(state, system.pieces[i].label, system.pieces[i].status) for i in system.at(state)[:1])
+
+
+def _border(question: Question) -> Result:
+    """Lemma 6 in its right form: at each border one of the two that act beside it moves away from it."""
+    where = question.formula("inside") if "inside" in question.claim.options else everything(question.system.width)
+    found = sliding(question.system, where)
+    if found is None:
+        text = "at each border between two that act one moves away from it, however short the steps are"
+        return Result(question.claim, "proven", text, "border")
+    one, other = (question.system.pieces[index].label for index in (found.one, found.other))
+    text = f"at {question.plant.shown(found.state)} neither '{one}' nor '{other}' moves away from their border"
+    return Result(question.claim, "refuted", text, "border", _at(question.system, found.state))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,32 @@ from canopy.compiler.errors import CompileError, Place
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo, echo_lines
 from canopy.files import FileError, read_bytes, write_files
+from canopy.verify.arithmetic import ARITHMETICS, SIGNALS, TITLES
 from canopy.verify.certify import certificate
 from canopy.verify.claims import Result
 from canopy.verify.logic import cli as logic
 from canopy.verify.model import Plant, number
-from canopy.verify.run import Subject, chosen, hand_over, load, model_path, recheck, verify
+from canopy.verify.run import Subject, chosen, hand_over, in_arithmetic, load, model_path, recheck, verify
 from canopy.verify.solvers import SOLVERS
 
 SHOWN = 8
 UNEXPECTED = 1
 INPUT_ERROR = 2
+
+
+@dataclass(frozen=True)
+class Decided:
+    """A claim's result, what solvers say of it, and the results in other arithmetics, by name."""
+
+    result: Result
+    checked: dict[str, str]
+    rounded: dict[str, Result]
+
+    @property
+    def is_good(self) -> bool:
+        """Is everything as the model file expects?"""
+        results = (self.result, *self.rounded.values())
+        return all(one.expected for one in results) and "disagrees" not in self.checked.values()
 
 
 def _trace(plant: Plant, result: Result, whole: bool) -> list[str]:
@@ -46,7 +63,16 @@ def _print(plant: Plant, result: Result, checked: dict[str, str], whole: bool) -
             echo(f"  {line}")
 
 
-def _as_json(subject: Subject, result: Result, checked: dict[str, str]) -> dict[str, Any]:
+def _print_rounded(plant: Plant, name: str, result: Result, whole: bool) -> None:
+    """What becomes of a claim in an arithmetic."""
+    mark = "" if result.expected else f"   NOT AS EXPECTED ({result.claim.options.get('expect', 'proven')})"
+    echo(f"         {TITLES[name]}: {result.verdict}, {result.text} ({result.method}, {result.seconds:.2f} s){mark}")
+    for line in _trace(plant, result, whole) if result.trace and (whole or not result.expected) else ():
+        echo(f"  {line}")
+
+
+def _as_json(subject: Subject, decided: Decided) -> dict[str, Any]:
+    result, checked = decided.result, decided.checked
     names = [variable.name for variable in subject.plant.variables]
     return {
         "claim": result.claim.name,
@@ -58,6 +84,14 @@ def _as_json(subject: Subject, result: Result, checked: dict[str, str]) -> dict[
         "bound": None if result.bound is None else number(result.bound),
         "seconds": round(result.seconds, 3),
         "solvers": {solver: answer for solver, answer in checked.items() if answer},
+        "arithmetic": {
+            name: {
+                "verdict": one.verdict,
+                "text": one.text,
+                "bound": None if one.bound is None else number(one.bound),
+            }
+            for name, one in decided.rounded.items()
+        },
         "trace": [
             {
                 "state": {name: number(value) for name, value in zip(names, visit.state, strict=True)},
@@ -129,7 +163,7 @@ def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tu
             raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
 
 
-WITH_MODEL = ("model", "dbc", "node", "names", "solver", "folder", "checked_folder", "handover")
+WITH_MODEL = ("model", "names", "arithmetic", "solver", "folder", "checked_folder", "handover")
 
 
 def _logic_usage(asked: bool, period: int | None) -> None:
@@ -142,24 +176,29 @@ def _logic_usage(asked: bool, period: int | None) -> None:
             raise click.UsageError(f"{option.opts[0]} needs a model: it does not go with --never or --always")
 
 
-def _finish(subject: Subject, results: list[tuple[Result, dict[str, str]]], json_: bool) -> None:
+def _finish(subject: Subject, results: list[Decided], json_: bool) -> None:
     """Ends with what the results say."""
     if json_:
-        echo_lines(dumps([_as_json(subject, *one) for one in results], indent=1))
+        echo_lines(dumps([_as_json(subject, one) for one in results], indent=1))
     elif not results:
         echo("the model is one of this tree; it claims nothing")
-    good = all(one.expected and "disagrees" not in checked.values() for one, checked in results)
-    sys.exit(0 if good else UNEXPECTED)
+    sys.exit(0 if all(one.is_good for one in results) else UNEXPECTED)
 
 
 @click.command()
 @click.argument("tree", metavar="TREE", type=click.Path(path_type=Path))
 @click.option("--model", type=click.Path(path_type=Path), help="The model. [default: NAME.plant.toml beside the tree]")
-@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: signals and units of the model are checked.")
+@click.option("--dbc", type=click.Path(path_type=Path), help="The bus: checks the model's signals and units.")
 @click.option("--node", help="The controller's name among the DBC's nodes; goes with --dbc.")
 @type_options
 @click.option("--claim", "names", multiple=True, metavar="NAME", help="Only this claim; may be given several times.")
 @click.option("--solver", multiple=True, type=click.Choice(SOLVERS), help="Have a solver check the proofs again.")
+@click.option(
+    "--arithmetic",
+    multiple=True,
+    type=click.Choice(ARITHMETICS),
+    help="Decide each claim also for leaves that see steps of the DBC's signals, or binary32.",
+)
 @click.option(
     "--timeout",
     default=60.0,
@@ -188,6 +227,7 @@ def command(
     main_tree: str | None,
     names: tuple[str, ...],
     solver: tuple[str, ...],
+    arithmetic: tuple[str, ...],
     timeout: float,
     folder: Path | None,
     checked_folder: Path | None,
@@ -206,8 +246,8 @@ def command(
     A certificate has the numbers that show a claim of the kinds reaches and avoids. --check judges them again with a
     small program that has no solver, and that reads tree and model by itself.
 
-    --never and --always need no model: they ask about the statuses of nodes, now and in the past, for any answers that
-    the leaves declare. They need the program berkeley-abc.
+    --never and --always need no model: they ask about nodes, entries and signals, now and in the past, for any answers
+    that the leaves declare and any messages. They need the program berkeley-abc, and --dbc and --node to know signals.
 
     Exit status: 0 all came out as the model file expects, and all questions are proven, 1 one did not, a solver
     disagrees, or a certificate is rejected, 2 wrong input.
@@ -225,21 +265,27 @@ def command(
     questions = [("--never", one) for one in never] + [("--always", one) for one in always]
     _logic_usage(bool(questions), period)
     _usage(dbc, node, main_tree, solver, folder is not None or checked_folder is not None)
+    if SIGNALS in arithmetic and dbc is None:
+        raise click.UsageError("--arithmetic signals needs --dbc and --node: they have the steps")
     results = []
     if checked_folder is not None:
         sys.exit(_check(checked_folder, tree, model or model_path(tree)))
     try:
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         if questions:
-            code = logic.run(tree, questions, options, period_ms=period, timeout=timeout, whole=whole, json_=json_)
-            sys.exit(code)
+            how = logic.How(dbc, node or "", period, timeout, whole, json_)
+            sys.exit(logic.run(tree, questions, options, how))
         subject = load(tree, model or model_path(tree), dbc, node or "", options)
+        others = {name: in_arithmetic(subject, name) for name in arithmetic}
         for claim in chosen(subject, names):
             result = verify(subject, claim, timeout)
             checked = {one: recheck(result, one) for one in solver}
-            results.append((result, checked))
+            rounded = {name: verify(other, claim, timeout) for name, other in others.items()}
+            results.append(Decided(result, checked, rounded))
             if not json_:
                 _print(subject.plant, result, checked, whole)
+            for name, one in rounded.items() if not json_ else ():
+                _print_rounded(subject.plant, name, one, whole)
             if folder is not None and result.verdict == "proven":
                 _certify(folder, subject, result, tree, timeout, quiet=json_)
         if handover and not json_:

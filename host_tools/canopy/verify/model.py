@@ -63,10 +63,14 @@ def standing_still(width: int) -> Step:
 
 @dataclass(frozen=True)
 class Mode:
-    """What a leaf does while it is RUNNING and the state is in `when`. `writes`: signals that its C sets there."""
+    """What a leaf does while it is RUNNING and the state is in `when`, for the leaf, and in `where`, for the plant.
+
+    `writes`: signals that its C sets there.
+    """
 
     name: str
     when: Formula
+    where: Formula
     step: Step
     writes: tuple[tuple[str, str | int], ...]
     place: Place = field(compare=False)
@@ -96,12 +100,13 @@ class Claim:
 
 @dataclass(frozen=True)
 class Plant:
-    """A model file."""
+    """A model file. `room`: by how much the state space is wider than the variables' ranges; empty: not at all."""
 
     path: Path
     variables: tuple[Variable, ...]
     leaves: dict[str, LeafModel] = field(compare=False)
     claims: tuple[Claim, ...]
+    room: tuple[Fraction, ...] = ()
 
     @property
     def width(self) -> int:
@@ -114,13 +119,21 @@ class Plant:
         return {one.name: one.unit for one in self.variables}
 
     @property
+    def declared(self) -> Polyhedron:
+        """Each variable in its range: where runs may start."""
+        return self._box((Fraction(0),) * self.width)
+
+    @property
     def domain(self) -> Polyhedron:
-        """The state space: each variable in its range."""
+        """The state space."""
+        return self._box(self.room or (Fraction(0),) * self.width)
+
+    def _box(self, room: tuple[Fraction, ...]) -> Polyhedron:
         atoms = []
-        for index, one in enumerate(self.variables):
+        for index, (one, more) in enumerate(zip(self.variables, room, strict=True)):
             unit = tuple(int(i == index) for i in range(self.width))
-            atoms.append(Atom(unit, one.high, False))
-            atoms.append(Atom(tuple(-value for value in unit), -one.low, False))
+            atoms.append(Atom(unit, one.high + more, False))
+            atoms.append(Atom(tuple(-value for value in unit), more - one.low, False))
         return Polyhedron(self.width, atoms)
 
     def shown(self, state: State) -> str:

@@ -14,23 +14,37 @@ from canopy.verify.linear import Formula, everything
 from canopy.verify.model import SUCCESS, Claim, Plant, Step
 from canopy.verify.reader import ModelReader
 from canopy.verify.regions import Arbitrary, Piece, Regions, pieces
+from canopy.verify.sensing import MAX_AGE, ZERO, Sensing
 from canopy.verify.system import System
 
 VERDICTS = ("proven", "refuted", "unknown")
-COMMON = ("name", "kind", "of", "arbitrary", "disturbance", "expect")
+COMMON = ("name", "kind", "of", "arbitrary", "disturbance", "error", "age", "expect")
 KEYS = {
     "reaches": (*COMMON, "from", "within", "goal"),
     "stays": (*COMMON, "goal"),
     "avoids": (*COMMON, "from", "avoid"),
     "margin": (*COMMON, "inside", "avoid", "at_least"),
     "dwell": (*COMMON, "from", "at_least"),
+    "invariant": (*COMMON, "from", "holds", "avoid"),
+    "border": ("name", "kind", "of", "arbitrary", "disturbance", "expect", "inside"),
 }
-NEEDED = {"reaches": (), "stays": (), "avoids": ("avoid",), "margin": ("inside", "avoid"), "dwell": ("at_least",)}
+NEEDED = {
+    "reaches": (),
+    "stays": (),
+    "avoids": ("avoid",),
+    "margin": ("inside", "avoid"),
+    "dwell": ("at_least",),
+    "invariant": ("holds",),
+    "border": (),
+}
 
 
 @dataclass(frozen=True)
 class Question:
-    """A claim with what it is about. `goal`: the pieces of the goal; `seconds`: how long the answer may take."""
+    """A claim with what it is about. `goal`: the pieces of the goal; `seconds`: how long the answer may take.
+
+    `sensing`: how leaves measure the state; None: they see it as it is. `measured`: the pieces of what they measure.
+    """
 
     claim: Claim
     plant: Plant
@@ -39,6 +53,8 @@ class Question:
     start: Formula
     goal: frozenset[int]
     seconds: float
+    sensing: Sensing | None = None
+    measured: tuple[Piece, ...] = ()
 
     def formula(self, key: str) -> Formula:
         """A formula among the claim's options."""
@@ -108,7 +124,26 @@ def _arbitrary(claim: Claim, reader: ModelReader, tree: Tree) -> dict[str, Arbit
     return result
 
 
+def _sensing(claim: Claim, reader: ModelReader) -> Sensing | None:
+    """How the leaves measure, if the claim says that."""
+    width = len(reader.names)
+    error, age = [ZERO] * width, [0] * width
+    path = ("claims", str(claim.index), "error")
+    for name, raw in reader.table(claim.options.get("error", {}), path, "'error'").items():
+        low, high = error[reader.index(name, path)] = reader.interval(raw, path, f"error of {name}")
+        if not low <= 0 <= high:
+            raise reader.fail(path, f"error of {name}: 0 is not in it", "write for example [-0.02, 0.02]")
+    path = ("claims", str(claim.index), "age")
+    given = claim.options.get("age", {})
+    for name, raw in (given if isinstance(given, dict) else dict.fromkeys(reader.names, given)).items():
+        if isinstance(raw, bool) or not isinstance(raw, int) or not 0 <= raw <= MAX_AGE:
+            raise reader.fail(path, f"age of {name} must be a number of steps, 0 to {MAX_AGE}, not {raw!r}")
+        age[reader.index(name, path)] = raw
+    return Sensing(tuple(error), tuple(age)) if any(age) or any(one != ZERO for one in error) else None
+
+
 def _made(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree) -> list[Piece]:
+    """The pieces of the claim's subtree, with the claim's disturbance."""
     options = claim.options
     root = node_named(claim.place, tree, options["of"], "of") if "of" in options else tree.root
     made = pieces(Regions(plant, _arbitrary(claim, reader, tree)), root)
@@ -118,17 +153,21 @@ def _made(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree) -> list[P
     more = [(Fraction(0), Fraction(0))] * plant.width
     for name, raw in reader.table(options["disturbance"], path, "'disturbance'").items():
         more[reader.index(name, path)] = reader.interval(raw, path, f"disturbance of {name}")
-    made = [replace(piece, step=_disturbed(piece.step, more)) for piece in made]
-    for piece in made:
+    return [replace(piece, step=_disturbed(piece.step, more)) for piece in made]
+
+
+def _check_kept(claim: Claim, plant: Plant, reader: ModelReader, made: Sequence[Piece]) -> None:
+    """What a claim adds to the model must not lead out of the state space."""
+    keys = [key for key in ("disturbance", "error", "age") if key in claim.options]
+    for piece in made if keys else ():
         found = leak(piece, plant.domain)
         if found is not None:
             raise reader.fail(
-                path,
-                f"with this disturbance '{piece.label}' leaves the state space: "
+                ("claims", str(claim.index), keys[-1]),
+                f"with this {' and '.join(keys)} '{piece.label}' leaves the state space: "
                 f"from {plant.shown(found[0])} to {plant.shown(found[1])}",
                 "widen the range of the variable, or say in the leaf's modes what happens at its end",
             )
-    return made
 
 
 def ask(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree, seconds: float) -> Question:
@@ -140,17 +179,22 @@ def ask(claim: Claim, plant: Plant, reader: ModelReader, tree: Tree, seconds: fl
     _check_keys(claim)
     path = ("claims", str(claim.index))
     options = claim.options
-    made = _made(claim, plant, reader, tree)
+    measured = made = _made(claim, plant, reader, tree)
+    sensing = _sensing(claim, reader)
+    if sensing is not None:
+        made = sensing.applied(made, plant.domain)
+    _check_kept(claim, plant, reader, made)
     goal = {index for index, piece in enumerate(made) if piece.status == SUCCESS}
     if "goal" in options:
         made, goal = _split(made, reader.formula(options["goal"], (*path, "goal"), f"goal of '{claim.name}'"))
     start = everything(plant.width)
     if "from" in options:
         start = reader.formula(options["from"], (*path, "from"), f"from of '{claim.name}'")
-    start = start & Formula(plant.width, (plant.domain,))
+    start = start & Formula(plant.width, (plant.declared,))
     if start.is_empty:
         raise CompileError(claim.place, f"claim '{claim.name}' starts from no state of the state space")
-    return Question(claim, plant, reader, System(made, plant.domain), start, frozenset(goal), seconds)
+    system = System(made, plant.domain)
+    return Question(claim, plant, reader, system, start, frozenset(goal), seconds, sensing, tuple(measured))
 
 
 def _split(made: Sequence[Piece], wanted: Formula) -> tuple[list[Piece], set[int]]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from canopy.compiler.errors import CompileError, nearest
 from canopy.verify.expression import ExpressionError, parse_formula, parse_sum
-from canopy.verify.linear import Formula, everything
+from canopy.verify.linear import Formula
 from canopy.verify.model import (
     STATUSES,
     Claim,
@@ -29,8 +29,8 @@ MAX_VARIABLES = 12
 ELSE = "else"
 VARIABLE_KEYS = ("unit", "range", "signal", "meaning")
 LEAF_KEYS = ("success", "running", "failure", "modes", "free")
-MODE_KEYS = ("name", "when", "next", "disturbance", "shorter_than", "writes")
-CLAIM_KINDS = ("reaches", "stays", "avoids", "margin", "dwell")
+MODE_KEYS = ("name", "when", "where", "next", "disturbance", "shorter_than", "writes")
+CLAIM_KINDS = ("reaches", "stays", "avoids", "margin", "dwell", "invariant", "border")
 
 
 class ModelReader:
@@ -163,16 +163,18 @@ class ModelReader:
         what = f"mode of leaf '{leaf}'"
         self.only(table, MODE_KEYS, path, what)
         name = self.text(table.get("name", ""), (*path, "name"), "name")
-        when = everything(len(self.names))
-        if "when" in table:
-            when = self.formula(table["when"], (*path, "when"), f"when of leaf '{leaf}'")
+        conditions = []
+        for key in ("when", "where"):
+            raw = table.get(key, "true")
+            conditions.append(self.formula(raw, (*path, key), f"{key} of leaf '{leaf}'"))
         if not {"next", "shorter_than"} & set(table):
             raise self.fail(path, f"a {what} has neither 'next' nor 'shorter_than'", 'write next = { x1 = "x1 - 1" }')
         writes = self.table(table.get("writes", {}), (*path, "writes"), "'writes'")
         for signal, value in writes.items():
             if isinstance(value, bool) or not isinstance(value, (str, int)):
                 raise self.fail((*path, "writes"), f"'{signal}' must be given a raw number or the name of a value")
-        return Mode(name, when, self.step(table, path, leaf), tuple(writes.items()), self.file.place(*path))
+        step = self.step(table, path, leaf)
+        return Mode(name, conditions[0], conditions[1], step, tuple(writes.items()), self.file.place(*path))
 
     def step(self, table: dict[str, Any], path: tuple[str, ...], leaf: str) -> Step:
         """What a mode does."""

@@ -204,13 +204,18 @@ def _while_do_else(made: list[Cases]) -> Cases:
 
 @dataclass(frozen=True)
 class Piece:
-    """States in which the tree does one thing: its status, who acts, and where the state goes."""
+    """States in which the tree does one thing: its status, who acts, and where the state goes.
+
+    `seen`: what the leaves decide by; `where`: what the plant does it by. `states` is both of them.
+    """
 
     states: Polyhedron
     status: Status
     label: str
     step: Step
     acting: Acting
+    seen: Polyhedron | None = None
+    where: Polyhedron | None = None
 
 
 def pieces(regions: Regions, root: Node) -> list[Piece]:
@@ -223,10 +228,15 @@ def pieces(regions: Regions, root: Node) -> list[Piece]:
     result = []
     for (status, acting), formula in regions.of(root).items():
         for part in formula.disjoint().parts:
-            for label, where, step in modes.of(acting):
-                for polyhedron in (where & Formula(part.width, (part,))).parts:
-                    result.append(Piece(polyhedron, status, label or status, step, acting))
+            for label, when, where, step in modes.of(acting):
+                for seen, there in product((when & Formula(part.width, (part,))).parts, where.parts):
+                    states = seen.meet(there)
+                    if not states.is_empty:
+                        result.append(Piece(states, status, label or status, step, acting, seen, there))
     return result
+
+
+Combined = tuple[str, Formula, Formula, Step]
 
 
 class _Modes:
@@ -242,30 +252,32 @@ class _Modes:
             self.nodes[node.path] = node
             waiting += node.children
 
-    def of(self, acting: Acting) -> list[tuple[str, Formula, Step]]:
-        """For each combination of their modes: its name, where it holds, and the step."""
-        result: list[tuple[str, Formula, Step]] = [("", everything(self.width), standing_still(self.width))]
+    def of(self, acting: Acting) -> list[Combined]:
+        """For each combination of their modes: its name, where leaf and plant are in it, and the step."""
+        everywhere = everything(self.width)
+        result: list[Combined] = [("", everywhere, everywhere, standing_still(self.width))]
         for path in acting:
             combined = []
             name = self.nodes[path].name
-            for (label, where, step), (mode, there, other) in product(result, self._one(path)):
-                both = where & there
-                if both.is_empty:
+            for (label, when, where, step), (mode, seen, there, other) in product(result, self._one(path)):
+                both = (when & seen, where & there)
+                if (both[0] & both[1]).is_empty:
                     continue
                 shown = f"{name} [{mode}]" if mode else name
-                combined.append((f"{label} + {shown}" if label else shown, both, self._together(step, other, path)))
+                combined.append((f"{label} + {shown}" if label else shown, *both, self._together(step, other, path)))
             result = combined
         return result
 
-    def _one(self, path: str) -> list[tuple[str, Formula, Step]]:
+    def _one(self, path: str) -> list[Combined]:
+        everywhere = everything(self.width)
         if path in self.regions.arbitrary:
             still = standing_still(self.width)
             shorter = self.regions.arbitrary[path].shorter
-            return [("anything", everything(self.width), Step(still.maps, still.noise, shorter))]
+            return [("anything", everywhere, everywhere, Step(still.maps, still.noise, shorter))]
         leaf = self.nodes[path].leaf
         assert leaf is not None
         modes = self.regions.plant.leaves[leaf.id].modes
-        return [(mode.name, mode.when, mode.step) for mode in modes]
+        return [(mode.name, mode.when, mode.where, mode.step) for mode in modes]
 
     def _together(self, one: Step, other: Step, path: str) -> Step:
         """Two steps at once; each variable has one that moves it (Assumption 2)."""

@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from canopy.compiler.bus_reader import read_bus
+from canopy.compiler.bus_reader import Bus, read_bus
 from canopy.compiler.errors import CompileError, nearest
 from canopy.compiler.port_types import Options
 from canopy.compiler.tree import Tree
 from canopy.compiler.tree_reader import read_tree
+from canopy.verify.arithmetic import TITLES, rounded
 from canopy.verify.checks import check_model
 from canopy.verify.claims import Result, decide
 from canopy.verify.handover import Handover, handovers
@@ -29,6 +30,7 @@ class Subject:
     tree: Tree
     plant: Plant
     reader: ModelReader
+    bus: Bus | None = None
 
 
 def model_path(tree: Path) -> Path:
@@ -44,8 +46,23 @@ def load(tree: Path, model: Path, dbc: Path | None = None, node: str = "", optio
     """
     read = read_tree(tree, options) if options is not None else read_tree(tree)
     plant, reader = read_model(model)
-    check_model(plant, read, read_bus(dbc, node, 1) if dbc is not None else None)
-    return Subject(read, plant, reader)
+    bus = read_bus(dbc, node, 1) if dbc is not None else None
+    check_model(plant, read, bus)
+    return Subject(read, plant, reader, bus)
+
+
+def in_arithmetic(subject: Subject, name: str) -> Subject:
+    """The same with leaves that decide by rounded states (arithmetic.py).
+
+    Raises:
+        CompileError: The model cannot be read so; or in it a step leaves the state space, say.
+    """
+    plant = rounded(subject.plant, name, subject.bus)
+    try:
+        check_model(plant, subject.tree, None)
+    except CompileError as error:
+        raise CompileError(error.place, f"{TITLES[name]}: {error.message}", error.help_text) from error
+    return replace(subject, plant=plant)
 
 
 def chosen(subject: Subject, names: tuple[str, ...]) -> list[Claim]:

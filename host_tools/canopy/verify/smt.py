@@ -56,9 +56,19 @@ def _not_after(system: System, index: int, kept: Polyhedron) -> str:
     return f"(not {all_of(substituted(item, maps) for item in kept.atoms)})"
 
 
-def leads(system: System, index: int, target: Polyhedron) -> str:
-    """A step from a piece into `target`."""
-    return all_of(_lead(system, index, (), target))
+def leads(system: System, index: int, target: Polyhedron, inside: Sequence[Atom] = ()) -> str:
+    """A step from a piece, and from `inside`, into `target`."""
+    return all_of(_lead(system, index, inside, target))
+
+
+def held_by(part: Polyhedron, kept: Formula) -> str:
+    """A state of a polyhedron that is not in a set."""
+    return all_of(part.atoms, *(f"(not {all_of(one.atoms)})" for one in kept.parts))
+
+
+def meets(one: Polyhedron, other: Polyhedron) -> str:
+    """A state of both."""
+    return all_of([*one.atoms, *other.atoms])
 
 
 def invariant_steps(invariant: Invariant) -> list[str]:

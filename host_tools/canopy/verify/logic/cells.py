@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from canopy.semantics.spec import FAILURE, RUNNING, SKIPPED, SUCCESS, Spec
+from canopy.verify.logic.board import Reads
 from canopy.verify.logic.circuit import FALSE, TRUE, Circuit
+from canopy.verify.logic.scripts import Scripts
 
 STATUSES = (RUNNING, SUCCESS, FAILURE, SKIPPED)
 Returned = dict[int, int]
@@ -24,12 +26,13 @@ class Plan:
     """What the cells of one tree share. `period_us`: length of a tick [µs]; None: a timer may end in any later tick."""
 
     circuit: Circuit
+    scripts: Scripts
     returns: dict[int, tuple[int, ...]]
+    """What each leaf may answer if it is called."""
+    reads: dict[int, Reads] = field(default_factory=dict)
     period_us: int | None = None
     answers: dict[int, Returned] = field(default_factory=dict)
-    """What each leaf answers if it is called."""
-    free: dict[tuple[int, str], int] = field(default_factory=dict)
-    """What scripts and timers answer: by the node's number and what is asked."""
+    """What each leaf answers."""
 
 
 class Cell:
@@ -86,9 +89,9 @@ class Cell:
             after = choose(self.ticked, value, latch)
             self.circuit.follow(latch, choose(self.reset if on_reset else self.halted, start, after))
 
-    def ask(self, what: str) -> int:
-        """An input of its own: what a script or a timer says."""
-        return self.plan.free.setdefault((self.number, what), self.circuit.input())
+    def ask(self, what: str, condition: int) -> int:
+        """What a script says that is run if the condition holds."""
+        return self.plan.scripts.ask(self.number, what, condition)
 
     def time_is_over(self, milliseconds: int, start: int) -> int:
         """Whether the time has passed since the tick in which `start` held; not to be asked before.
@@ -97,7 +100,7 @@ class Cell:
         """
         at_once = TRUE if milliseconds == 0 else FALSE
         if self.plan.period_us is None:
-            return self.circuit.choose(start, at_once, self.ask("time is over"))
+            return self.circuit.choose(start, at_once, self.plan.scripts.anything(self.number, "time is over"))
         ticks = -(-milliseconds * 1000 // self.plan.period_us)
         left = [self.circuit.latch() for _ in range(max(ticks - 1, 0).bit_length())]
         borrow = self.circuit.any(left)
@@ -111,10 +114,24 @@ class Cell:
 
 
 class UserLeaf(Cell):
-    """Answers anything that it declares."""
+    """Answers anything that it declares, and writes anything; while something it reads is stale it is not called."""
 
     def rule(self, ticked: int) -> Returned:
         """One or two inputs choose among the statuses."""
+        chosen = self.chosen()
+        reads = self.plan.reads.get(self.number)
+        memory = self.plan.scripts.memory
+        known = TRUE if reads is None or memory is None else memory.known(reads.messages, reads.signals)
+        if memory is not None:
+            memory.called(self.number, self.circuit.both(ticked, known))
+        if reads is not None:
+            chosen = {status: self.circuit.both(known, literal) for status, literal in chosen.items()}
+            chosen[reads.stale] = self.circuit.either(chosen.get(reads.stale, FALSE), known ^ 1)
+        self.plan.answers[self.number] = chosen
+        return chosen
+
+    def chosen(self) -> Returned:
+        """What it answers when it is called."""
         allowed = self.plan.returns[self.number]
         chosen: Returned = {}
         rest = TRUE
@@ -123,12 +140,11 @@ class UserLeaf(Cell):
             chosen[status] = self.circuit.both(rest, wanted)
             rest = self.circuit.both(rest, wanted ^ 1)
         chosen[allowed[-1]] = rest
-        self.plan.answers[self.number] = chosen
         return chosen
 
 
 class Constant(Cell):
-    """AlwaysSuccess, and what is done when its script has run."""
+    """AlwaysSuccess."""
 
     status = SUCCESS
 
@@ -153,10 +169,44 @@ class Sleep(Cell):
         return {SUCCESS: over, RUNNING: over ^ 1}
 
 
-class Asked(Cell):
-    """ScriptCondition, WasEntryUpdated: a free answer."""
+class Script(Constant):
+    """Runs its script."""
 
     def rule(self, ticked: int) -> Returned:
-        """SUCCESS if the script is true, or the entry was written."""
-        yes = self.ask("is true")
+        """Nothing can stop it: what reads a signal is a ScriptCondition here."""
+        self.plan.scripts.run(self.number, "is true", ticked)
+        return super().rule(ticked)
+
+
+class ScriptCondition(Cell):
+    """What a script says; whether it was run, of one that only writes."""
+
+    def rule(self, ticked: int) -> Returned:
+        """SUCCESS if the script is true."""
+        yes = self.ask("is true", ticked)
         return {SUCCESS: yes, FAILURE: yes ^ 1}
+
+
+class WasEntryUpdated(Cell):
+    """Asks in each tick."""
+
+    def rule(self, ticked: int) -> Returned:
+        """SUCCESS if the entry was written since."""
+        yes = self.plan.scripts.is_new(self.number, ticked)
+        return {SUCCESS: yes, FAILURE: yes ^ 1}
+
+
+class TestNode(Cell):
+    """RUNNING until the time is over, then its scripts, and its status."""
+
+    def rule(self, ticked: int) -> Returned:
+        """Its clock starts when it was not RUNNING."""
+        status, delay = self.spec.parameters
+        start = self.circuit.both(ticked, self.old[RUNNING] ^ 1)
+        over = self.time_is_over(delay, start)
+        done = self.circuit.both(ticked, over)
+        script = {SUCCESS: "success_script", FAILURE: "failure_script"}.get(status)
+        if script is not None:
+            self.plan.scripts.run(self.number, script, done)
+        self.plan.scripts.run(self.number, "post_script", done)
+        return {status: over, RUNNING: over ^ 1}

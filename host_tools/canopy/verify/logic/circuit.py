@@ -85,6 +85,10 @@ class Circuit:
             return yes
         return self.either(self.both(condition, yes), self.both(condition ^ 1, no))
 
+    def differ(self, a: int, b: int) -> int:
+        """One of two, and not the other."""
+        return self.choose(a, b ^ 1, b)
+
     def count(self, literals: Iterable[int], most: int) -> list[int]:
         """How many hold, in unary: element k says "more than k", up to `most` elements."""
         return self.add([], literals, most)

@@ -148,13 +148,18 @@ class RunOnce(Decorator):
 
 
 class Precondition(Decorator):
-    """The script's answer is free."""
+    """Ticks its child if a script allows it."""
 
     def rule(self, ticked: int) -> Returned:
         """Asked while the child is not RUNNING."""
-        allowed = self.circuit.either(self.child_runs(), self.ask("is true"))
+        asked = self.circuit.both(ticked, self.child_runs() ^ 1)
+        allowed = self.circuit.either(self.child_runs(), self.answer(asked))
         status = self.tick_child(self.circuit.both(ticked, allowed))
         return self.otherwise(status, allowed ^ 1, self.status())
+
+    def answer(self, asked: int) -> int:
+        """The script's."""
+        return self.ask("is true", asked)
 
     def status(self) -> int:
         """What it returns when the child is not ticked."""
@@ -162,15 +167,19 @@ class Precondition(Decorator):
 
 
 class SkipUnlessUpdated(Precondition):
-    """Whether the entry was written is free."""
+    """Asks for the entry, not a script."""
+
+    def answer(self, asked: int) -> int:
+        """Was the entry written since?"""
+        return self.plan.scripts.is_new(self.number, asked)
 
     def status(self) -> int:
         """As it is called."""
         return SKIPPED
 
 
-class WaitValueUpdate(Precondition):
-    """Whether the entry was written is free."""
+class WaitValueUpdate(SkipUnlessUpdated):
+    """The same with another status."""
 
     def status(self) -> int:
         """As it is called."""
@@ -182,7 +191,7 @@ class Loop(Precondition):
 
     def rule(self, ticked: int) -> Returned:
         """RUNNING until the queue is empty or the child fails."""
-        taken = self.circuit.either(self.child_runs(), self.ask("is true"))
+        taken = self.circuit.either(self.child_runs(), self.answer(self.circuit.both(ticked, self.child_runs() ^ 1)))
         child = self.tick_child(self.circuit.both(ticked, taken))
         status = dict.fromkeys(STATUSES, FALSE)
         status[FAILURE] = child[FAILURE]
@@ -191,44 +200,51 @@ class Loop(Precondition):
 
 
 class Attributes(Decorator):
-    """The answers of the four preconditions are free; postconditions change no status."""
+    """Preconditions decide; postconditions only write entries."""
 
-    def answer(self, name: str) -> int:
-        """A script's; without one, nothing is true."""
-        return FALSE if self.spec.scripts[ATTRIBUTES.index(name)] is None else self.ask(name)
+    def answer(self, name: str, asked: int) -> int:
+        """A script's that is run if `asked` holds; without one, nothing is true."""
+        return FALSE if self.spec.scripts[ATTRIBUTES.index(name)] is None else self.ask(name, asked)
 
     def rule(self, ticked: int) -> Returned:
         """Asked in their order when the child is not RUNNING; _while in every tick."""
         both, runs = self.circuit.both, self.child_runs()
-        holds = TRUE if self.spec.scripts[ATTRIBUTES.index("_while")] is None else self.ask("_while")
-        fails, succeeds = self.answer("_failureIf"), self.answer("_successIf")
-        skips = self.circuit.either(self.answer("_skipIf"), holds ^ 1)
-        rest = runs ^ 1
-        failed = both(rest, fails)
-        rest = both(rest, fails ^ 1)
-        succeeded = both(rest, succeeds)
-        rest = both(rest, succeeds ^ 1)
+        rest = both(ticked, runs ^ 1)
+        failed = both(rest, self.answer("_failureIf", rest))
+        rest = both(rest, failed ^ 1)
+        succeeded = both(rest, self.answer("_successIf", rest))
+        rest = both(rest, succeeded ^ 1)
+        skips = both(rest, self.answer("_skipIf", rest))
+        rest = both(rest, skips ^ 1)
+        runs = both(ticked, runs)
+        has_while = self.spec.scripts[ATTRIBUTES.index("_while")] is not None
+        holds = self.ask("_while", self.circuit.either(runs, rest)) if has_while else TRUE
         stopped = both(runs, holds ^ 1)
-        skipped = self.circuit.either(stopped, both(rest, skips))
-        goes_on = self.circuit.any((failed, succeeded, skipped)) ^ 1
-        status = self.tick_child(both(ticked, goes_on))
-        self.children[0].abandon(both(ticked, stopped))
+        skipped = self.circuit.any((skips, stopped, both(rest, holds ^ 1)))
+        status = self.tick_child(both(self.circuit.either(runs, rest), holds))
+        self.children[0].abandon(stopped)
         for condition, other in ((failed, FAILURE), (succeeded, SUCCESS), (skipped, SKIPPED)):
             status = self.otherwise(status, condition, other)
+        self.complete(status)
         return status
+
+    def complete(self, status: Returned) -> None:
+        """The postconditions."""
+        run = self.plan.scripts.run
+        run(self.number, "_onSuccess", status[SUCCESS])
+        run(self.number, "_onFailure", status[FAILURE])
+        run(self.number, "_post", self.circuit.either(status[SUCCESS], status[FAILURE]))
 
 
 class Switch(Cell):
-    """Which case matches is free."""
+    """The first case that matches, or the last child."""
 
     def rule(self, ticked: int) -> Returned:
         """The others are halted, and the child is reset when it is done."""
-        rest = ticked
+        cases = self.plan.scripts.cases(self.number, len(self.children) - 1)
         results = []
-        for index, child in enumerate(self.children):
-            last = index == len(self.children) - 1
-            chosen = rest if last else self.circuit.both(rest, self.ask(f"case {index}"))
-            rest = self.circuit.both(rest, chosen ^ 1)
+        for child, case in zip(self.children, [*cases, self.circuit.any(cases) ^ 1], strict=True):
+            chosen = self.circuit.both(ticked, case)
             status = child.tick(chosen)
             results.append(status)
             other = self.circuit.all((ticked, chosen ^ 1, child.old[RUNNING]))

@@ -3,6 +3,8 @@
 
 formula  a implies b, a or b, a and b, not a, (a), true, false, atoms, operators; `implies` binds least and to the right
 atom     WHAT(NODE): NODE is a name or a path; in "quotes" unless it is letters, digits, _ and /
+         FRESH(MESSAGE)
+         {condition}: in the language of scripts, of the main tree's entries and of signals, after the tick
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from canopy.compiler.errors import nearest
 from canopy.verify.expression import ExpressionError
@@ -27,6 +30,7 @@ ATOMS = {
     "TICKED": "was ticked in this tick",
     "HALTED": "was RUNNING and was halted in this tick",
 }
+FRESH = "FRESH"
 # Formulas that each takes, and whether a number of ticks follows: no, may, must.
 OPERATORS = {
     "previous": (1, "no"),
@@ -36,16 +40,28 @@ OPERATORS = {
     "responds": (2, "must"),
 }
 CONNECTIVES = ("implies", "or", "and", "not")
-KNOWN = (*ATOMS, *OPERATORS, *CONNECTIVES, "true", "false")
+KNOWN = (*ATOMS, FRESH, *OPERATORS, *CONNECTIVES, "true", "false")
 
-Named = Callable[[str, str, int], int]
+_TOKEN = re.compile(r'\s*(?:(?P<word>[\w/]+)|"(?P<quoted>[^"]*)"|\{(?P<script>[^{}]*)\}|(?P<sign>[(),]))')
+_OPENING = {"quoted": '"', "script": "{"}
 
-_TOKEN = re.compile(r'\s*(?:(?P<word>[\w/]+)|"(?P<quoted>[^"]*)"|(?P<sign>[(),]))')
+
+class Names(Protocol):
+    """What the names in a formula stand for. Each raises ExpressionError, `at` the place of a name in the text."""
+
+    def number(self, what: str, name: str, at: int) -> int:
+        """The number of a node, for an atom."""
+
+    def fresh(self, message: str, at: int) -> int:
+        """The number of the fact that a message is fresh."""
+
+    def condition(self, text: str, at: int) -> int:
+        """The number of the fact that a condition in the language of scripts holds."""
 
 
 @dataclass(frozen=True)
 class Formula:
-    """`what` is an atom, an operator or a connective; `node` is the number of an atom's, `ticks` of an operator's."""
+    """`what`: an atom, `fact`, an operator or a connective. `node`: an atom's, or a fact's. `ticks`: an operator's."""
 
     what: str
     parts: tuple[Formula, ...] = ()
@@ -67,20 +83,21 @@ def _split(text: str) -> list[_Token]:
         found = _TOKEN.match(text, at)
         if found is None or found.lastgroup is None:
             at += len(text[at:]) - len(text[at:].lstrip())
-            message = "a quote is not closed" if text[at] == '"' else f"unexpected '{text[at]}'"
+            closed = {'"': "a quote is not closed", "{": "a brace is not closed, or another one is in it"}
+            message = closed.get(text[at], f"unexpected '{text[at]}'")
             raise ExpressionError(at, message, 'write for example: RUNNING(A) and not once(SUCCESS("Go home"), 3)')
-        start = found.start(found.lastgroup) - (found.lastgroup == "quoted")
+        start = found.start(found.lastgroup) - (found.lastgroup in _OPENING)
         tokens.append(_Token(found.lastgroup, found[found.lastgroup], start))
         at = found.end()
     return tokens
 
 
 class _Parser:
-    def __init__(self, text: str, node: Named) -> None:
+    def __init__(self, text: str, names: Names) -> None:
         if len(text) > MAX_LENGTH:
             raise ExpressionError(0, f"the formula is longer than {MAX_LENGTH} characters")
         self._tokens = [*_split(text), _Token("end", "", len(text))]
-        self._node = node
+        self._names = names
         self._depth = 0
 
     def _take(self) -> _Token:
@@ -88,7 +105,7 @@ class _Parser:
 
     def _is(self, text: str) -> bool:
         token = self._tokens[0]
-        if token.kind == "quoted" or token.text != text:
+        if token.kind in _OPENING or token.text != text:
             return False
         self._take()
         return True
@@ -134,11 +151,13 @@ class _Parser:
             result = self._implies()
             self._need(")")
             return result
+        if token.kind == "script":
+            return Formula("fact", (), self._names.condition(token.text, token.at + 1))
         if token.kind != "word":
             raise ExpressionError(token.at, f"expected a formula, not {_shown(token)}", "write for example: RUNNING(A)")
         if token.text in ("true", "false"):
             return Formula(token.text)
-        if token.text in ATOMS:
+        if token.text in (*ATOMS, FRESH):
             return self._atom(token)
         if token.text in OPERATORS:
             return self._operator(token)
@@ -148,14 +167,17 @@ class _Parser:
         self._need("(")
         name = self._take()
         if name.kind not in ("word", "quoted"):
-            raise ExpressionError(name.at, f"expected a node's name, not {_shown(name)}")
-        number = self._node(token.text, name.text, name.at)
+            raise ExpressionError(name.at, f"expected a name, not {_shown(name)}")
+        if token.text == FRESH:
+            what, number = "fact", self._names.fresh(name.text, name.at)
+        else:
+            what, number = token.text, self._names.number(token.text, name.text, name.at)
         if self._tokens[0].kind == "word":
             raise ExpressionError(
                 self._tokens[0].at, f"expected ')', not {_shown(self._tokens[0])}", 'quote names with blanks: "Go home"'
             )
         self._need(")")
-        return Formula(token.text, (), number)
+        return Formula(what, (), number)
 
     def _operator(self, token: _Token) -> Formula:
         count, number = OPERATORS[token.text]
@@ -179,10 +201,10 @@ def _shown(token: _Token) -> str:
     return "the end" if token.kind == "end" else f"'{token.text}'"
 
 
-def parse(text: str, node: Named) -> Formula:
-    """Reads a formula. `node` gives the number of a node from the atom, the node's name, and the name's place.
+def parse(text: str, names: Names) -> Formula:
+    """Reads a formula.
 
     Raises:
         ExpressionError: It is not one; says at which character.
     """
-    return _Parser(text, node).whole()
+    return _Parser(text, names).whole()

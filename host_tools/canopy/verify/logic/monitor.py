@@ -10,7 +10,7 @@ from canopy.verify.logic.cells import STATUSES, Cell
 from canopy.verify.logic.circuit import FALSE, TRUE, Circuit
 from canopy.verify.logic.encode import Encoding
 from canopy.verify.logic.formula import Formula
-from canopy.verify.logic.replay import Moment
+from canopy.verify.logic.replay import Moment, Shot
 
 _RETURNED = {"SUCCESS": SUCCESS, "FAILURE": FAILURE, "SKIPPED": SKIPPED}
 
@@ -71,6 +71,8 @@ def literal(encoding: Encoding, formula: Formula) -> int:
             ticks = formula.ticks or 0
             due = _delayed(circuit, parts[0], ticks)[ticks]
             return circuit.both(due, _once(circuit, parts[1], ticks) ^ 1) ^ 1
+        case "fact":
+            return encoding.told[formula.node]
     return _atom(circuit, formula.what, encoding.cells[formula.node])
 
 
@@ -82,7 +84,7 @@ def _at(moment: Moment, what: str) -> bool:
     return moment.halted if what == "HALTED" else moment.returned == _RETURNED[what]
 
 
-def holds(formula: Formula, trace: Sequence[Sequence[Moment]]) -> list[bool]:
+def holds(formula: Formula, trace: Sequence[Shot]) -> list[bool]:
     """Whether a formula holds, in each tick of a trace; by the definition, from the trace alone."""
     ticks = range(len(trace))
     parts = [holds(part, trace) for part in formula.parts]
@@ -109,4 +111,6 @@ def holds(formula: Formula, trace: Sequence[Sequence[Moment]]) -> list[bool]:
         case "responds":
             wait = formula.ticks or 0
             return [now < wait or not parts[0][now - wait] or any(parts[1][now - wait : now + 1]) for now in ticks]
-    return [_at(moments[formula.node], formula.what) for moments in trace]
+        case "fact":
+            return [shot.facts[formula.node] for shot in trace]
+    return [_at(shot.moments[formula.node], formula.what) for shot in trace]
