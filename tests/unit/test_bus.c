@@ -353,6 +353,8 @@ static void ages_are_whole_milliseconds_rounded_up(void)
     TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65533001));
     TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65534000));
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65534001));
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65535001)); /* 0 in 16 bits */
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65536000));
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(UINT64_C(1) << 32)); /* 0 in 32 bits */
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of((UINT64_C(1) << 32) + 1000u));
 }

@@ -213,16 +213,12 @@ static canopy_can_controller_t unixbus_state(void *context)
 
 static void unixbus_stats(void *context, canopy_can_stats_t *stats)
 {
-    canopy_unixbus_t *self = context;
-    (void)pthread_mutex_lock(&self->tx.lock);
-    const uint32_t sent = self->tx.sent;
-    const uint32_t tx_dropped = self->tx.dropped;
-    (void)pthread_mutex_unlock(&self->tx.lock);
+    const canopy_unixbus_t *self = context;
     *stats = (canopy_can_stats_t){
         .received = self->received,
-        .sent = sent,
+        .sent = atomic_load_explicit(&self->tx.sent, memory_order_relaxed),
         .rx_dropped = canopy_ring_dropped(&self->queue) + atomic_load_explicit(&self->lost, memory_order_relaxed),
-        .tx_dropped = tx_dropped,
+        .tx_dropped = atomic_load_explicit(&self->tx.dropped, memory_order_relaxed),
         .error_frames = atomic_load_explicit(&self->error_frames, memory_order_relaxed),
         .rx_high_water = canopy_ring_high_water(&self->queue),
     };

@@ -4,7 +4,8 @@
  * The unixbus's way out: one socket for each other participant, and the newest frames for those that are full just now.
  *
  * The loop's thread sends a frame to everybody who has got all before it. Who is behind is the other thread's to serve: so
- * a send costs the loop one call for each participant that keeps up, and nothing for one that does not.
+ * a send costs the loop one call for each participant that keeps up, and nothing for one that does not. Nor does it wait for
+ * the other thread, which may have been stopped by the scheduler while it has the lock.
  */
 #include <errno.h>
 #include <string.h>
@@ -24,7 +25,7 @@ int64_t canopy_unixbus_now(void)
     return canopy_arrival_monotonic() / 1000;
 }
 
-/* With the loop's priority while the loop waits for it: the thread holds it for a few calls of the kernel at most. */
+/* With the loop's priority where the loop has to wait for it, which it does only to join again and to close. */
 static int make_lock(pthread_mutex_t *lock)
 {
     pthread_mutexattr_t attributes;
@@ -45,9 +46,12 @@ canopy_error_t canopy_unixbus_tx_open(canopy_unixbus_tx_t *self, const char *bus
         return error;
     }
     self->head = 0u;
-    self->sent = 0u;
-    self->dropped = 0u;
+    atomic_init(&self->sent, 0u);
+    atomic_init(&self->dropped, 0u);
+    (void)canopy_ring_init(&self->inbox, self->waiting, sizeof self->waiting, sizeof self->waiting[0],
+                           CANOPY_UNIXBUS_INBOX); /* its arguments are right */
     atomic_init(&self->is_behind, false);
+    atomic_init(&self->nobody_takes, false);
     errno = make_lock(&self->lock);
     return errno == 0 ? CANOPY_OK : CANOPY_ERROR_IO;
 }
@@ -125,12 +129,17 @@ static delivery_t deliver(canopy_unixbus_tx_t *self, canopy_unixbus_peer_t *peer
     return delivery;
 }
 
+static void count(_Atomic uint32_t *counter, uint32_t number)
+{
+    atomic_fetch_add_explicit(counter, number, memory_order_relaxed);
+}
+
 static void lose(canopy_unixbus_tx_t *self, canopy_unixbus_peer_t *peer, uint32_t frames)
 {
     peer->next += frames;
     peer->untold = peer->untold > UINT32_MAX - frames ? UINT32_MAX : peer->untold + frames;
     peer->is_deaf = true;
-    self->dropped += frames;
+    count(&self->dropped, frames);
 }
 
 /** Gives a participant what it has not got. @return false: it is gone */
@@ -203,32 +212,56 @@ static int send_locked(canopy_unixbus_tx_t *self, const canopy_can_frame_t *fram
     const int64_t now = canopy_unixbus_now();
     const canopy_error_t error = canopy_unixbus_folder_refresh(&self->folder, self->head);
     if (error != CANOPY_OK) {
-        self->dropped++;
+        count(&self->dropped, 1u);
         return error;
     }
     place->sent_at = now;
     place->size = (uint8_t)canopy_unixbus_encode(place->datagram, frame);
     self->head++;
     const spread_t result = spread(self, now);
-    if (self->folder.count > 0u && !result.taken && !result.coming) {
+    const bool nobody = self->folder.count > 0u && !result.taken && !result.coming;
+    atomic_store(&self->nobody_takes, nobody);
+    if (nobody) {
         self->head--; /* nobody has it, so it is not out */
         return 0;
     }
-    self->dropped += self->folder.too_many;
-    self->sent++;
+    count(&self->dropped, self->folder.too_many ? 1u : 0u);
+    count(&self->sent, 1u);
     if (result.behind) {
         atomic_store(&self->is_behind, true);
     }
     return 1;
 }
 
+/** What the loop has left while somebody else had the lock. It was called sent: what nobody takes now is lost. */
+static void empty_inbox(canopy_unixbus_tx_t *self)
+{
+    canopy_can_frame_t frame;
+    while (canopy_ring_pop(&self->inbox, &frame)) {
+        if (send_locked(self, &frame) == 0) {
+            count(&self->dropped, 1u);
+        }
+    }
+}
+
 int canopy_unixbus_tx_send(canopy_unixbus_tx_t *self, const canopy_can_frame_t *frame)
 {
-    (void)pthread_mutex_lock(&self->lock);
-    const bool is_frame = canopy_can_frame_can_be_sent(frame);
-    self->dropped += !is_frame;
-    const int result = is_frame ? send_locked(self, frame) : CANOPY_ERROR_ARGUMENT;
-    (void)pthread_mutex_unlock(&self->lock);
+    int result;
+    if (!canopy_can_frame_can_be_sent(frame)) {
+        count(&self->dropped, 1u);
+        return CANOPY_ERROR_ARGUMENT;
+    }
+    if (pthread_mutex_trylock(&self->lock) == 0) {
+        empty_inbox(self);
+        result = send_locked(self, frame);
+        (void)pthread_mutex_unlock(&self->lock);
+        return result;
+    }
+    if (atomic_load(&self->nobody_takes)) {
+        return 0;
+    }
+    result = canopy_ring_push(&self->inbox, frame) ? 1 : 0;
+    atomic_store(&self->is_behind, true);
     return result;
 }
 
@@ -242,7 +275,7 @@ static bool has_room(const canopy_unixbus_waiting_t *waiting, int socket)
     return false;
 }
 
-/* The lock is given back after each participant: the loop waits for one of them at most. */
+/* The lock is given back after each participant, so that the loop finds it free. */
 int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self, canopy_unixbus_waiting_t *waiting)
 {
     static const int64_t never = INT64_MAX;
@@ -255,6 +288,7 @@ int64_t canopy_unixbus_tx_catch_up(canopy_unixbus_tx_t *self, canopy_unixbus_wai
     atomic_store(&self->is_behind, false); /* set again by whoever is found behind, here or by the loop meanwhile */
     for (size_t i = 0; is_there;) {
         (void)pthread_mutex_lock(&self->lock);
+        empty_inbox(self);
         canopy_unixbus_peer_t *peer = &self->folder.peers[i];
         is_there = i < self->folder.count;
         if (is_there && peer->next != self->head && (is_due(peer, now) || has_room(waiting, peer->socket)) &&
@@ -286,6 +320,7 @@ void canopy_unixbus_tx_finish(canopy_unixbus_tx_t *self)
     while (coming && canopy_unixbus_now() < end) {
         coming = false;
         (void)pthread_mutex_lock(&self->lock);
+        empty_inbox(self);
         for (size_t i = 0; i < self->folder.count; i++) {
             const canopy_unixbus_peer_t *peer = &self->folder.peers[i];
             coming |= peer->next != self->head && !peer->is_deaf;
@@ -299,7 +334,9 @@ void canopy_unixbus_tx_finish(canopy_unixbus_tx_t *self)
 
 bool canopy_unixbus_tx_is_joined(canopy_unixbus_tx_t *self)
 {
-    (void)pthread_mutex_lock(&self->lock);
+    if (pthread_mutex_trylock(&self->lock) != 0) {
+        return true; /* the other thread is at work on it; it is asked again soon */
+    }
     const bool result = canopy_unixbus_folder_refresh(&self->folder, self->head) != CANOPY_ERROR_BUS_DOWN;
     (void)pthread_mutex_unlock(&self->lock);
     return result;

@@ -24,7 +24,7 @@
  * Errors of the operating system: none lasts. A receive that failed is told once by receive() or wait(), and is tried again
  * 10 ms later; a folder that could not be read is read again at the next send.
  *
- * Memory: the object is the caller's (about 270 KiB: make it static), and one file descriptor for each other participant;
+ * Memory: the object is the caller's (about 290 KiB: make it static), and one file descriptor for each other participant;
  * the operating system's thread and directory functions allocate.
  */
 #ifndef CANOPY_CAN_UNIXBUS_H
@@ -53,6 +53,9 @@
 
 /** Newest sent frames that are kept for participants that are full. */
 #define CANOPY_UNIXBUS_BACKLOG 1024u
+
+/** Frames that can wait while the driver's thread is at work on the list of participants. */
+#define CANOPY_UNIXBUS_INBOX 256u
 
 /** How long a frame is offered to a participant that is full [us]: an old command must not arrive late. */
 #define CANOPY_UNIXBUS_LATE_US 100000u
@@ -91,14 +94,20 @@ typedef struct {
     uint8_t datagram[8u + CANOPY_CAN_DATA_MAX];
 } canopy_unixbus_sent_t;
 
-/** What was sent, and to whom it has still to go. Both threads work on it, under the lock. Private. */
+/**
+ * What was sent, and to whom it has still to go. Both threads work on it, under the lock; but the loop never waits for the
+ * lock: what it cannot send itself it leaves in the inbox for the thread. Private.
+ */
 typedef struct {
     pthread_mutex_t lock;
     canopy_unixbus_folder_t folder;
     uint32_t head; /* number of the next frame */
-    uint32_t sent;
-    uint32_t dropped;
-    atomic_bool is_behind; /* somebody has not got all of it: the thread shall try again */
+    _Atomic uint32_t sent;
+    _Atomic uint32_t dropped;
+    canopy_ring_t inbox; /* from the loop to whoever has the lock */
+    canopy_can_frame_t waiting[CANOPY_UNIXBUS_INBOX];
+    atomic_bool is_behind;    /* somebody has not got all of it: the thread shall try again */
+    atomic_bool nobody_takes; /* of the last frame */
     canopy_unixbus_sent_t frames[CANOPY_UNIXBUS_BACKLOG];
 } canopy_unixbus_tx_t;
 
