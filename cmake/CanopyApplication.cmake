@@ -2,8 +2,9 @@
 # canopy_add_application(NAME TREE tree.xml DBC bus.dbc NODE node PERIOD_MS ms LEAVES leaves.c…
 #                        [MAIN_TREE id] [INCLUDE state_types.h] [ALLOW_FLOATING_POINT] [ALLOW_UNSET_PORTS]
 #                        [TYPE_MAP "C++ type=C type"…] [ROS_PACKAGE name=folder…]
+#                        [SEARCH folder, project or file…] [FOREIGN attribute…]
 #                        [IMAGE_NODES nodes [IMAGE_USES uses]]
-#                        [TRACE id [TRACE_ENTRIES all|marked|none] [TRACE_GUARD data_id]]
+#                        [TRACE id [TRACE_ENTRIES all|marked|none] [TRACE_GUARD data_id] [TRACE_TICKS ticks]]
 #                        [BITRATE bit/s] [FOREIGN_LOAD percent] [FOREIGN_BURST frames] [TX_LATENCY_US us]
 #                        [MAX_RAM bytes] [MAX_FLASH bytes])
 #
@@ -20,10 +21,11 @@
 # The generated files, the model file for the host tools among them, are in
 # ${CMAKE_CURRENT_BINARY_DIR}/generated/NAME.
 #
-# canopy_add_image(NAME TREE tree.xml FOR application)
+# canopy_add_image(NAME TREE tree.xml FOR application [MODEL])
 #
 # Compiles another tree to an image that this application, of the same folder and with IMAGE_NODES, can load while it
-# runs (docs/image.md): generated/APPLICATION/NAME.img, made by the target NAME_image.
+# runs (docs/image.md): generated/APPLICATION/NAME.img, made by the target NAME_image. MODEL: its model file, too,
+# NAME.model.json, for the host tools.
 include_guard(GLOBAL)
 
 include("${CMAKE_CURRENT_LIST_DIR}/Python.cmake") # CANOPY_PYTHON
@@ -32,14 +34,15 @@ include("${CMAKE_CURRENT_LIST_DIR}/Python.cmake") # CANOPY_PYTHON
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH CANOPY_SOURCE_DIR)
 file(GLOB_RECURSE CANOPY_COMPILER_SOURCES CONFIGURE_DEPENDS
      "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.py" "${CANOPY_SOURCE_DIR}/host_tools/canopy/compiler/*.j2"
+     "${CANOPY_SOURCE_DIR}/host_tools/canopy/tree/*.py"
      "${CANOPY_SOURCE_DIR}/runtime/include/canopy/nodes.def")
 # A property: a variable would be known only where this file was included first.
 set_property(GLOBAL PROPERTY CANOPY_COMPILER_SOURCES "${CANOPY_COMPILER_SOURCES}")
 
 function(canopy_add_application NAME)
   cmake_parse_arguments(PARSE_ARGV 1 APP "ALLOW_FLOATING_POINT;ALLOW_UNSET_PORTS" 
-                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;TRACE;TRACE_ENTRIES;TRACE_GUARD;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
-                        "LEAVES;TYPE_MAP;ROS_PACKAGE")
+                        "TREE;MAIN_TREE;DBC;NODE;PERIOD_MS;INCLUDE;BITRATE;FOREIGN_LOAD;FOREIGN_BURST;TX_LATENCY_US;TRACE;TRACE_ENTRIES;TRACE_GUARD;TRACE_TICKS;MAX_RAM;MAX_FLASH;IMAGE_NODES;IMAGE_USES" # one string: no list across lines
+                        "LEAVES;TYPE_MAP;ROS_PACKAGE;SEARCH;FOREIGN")
   foreach(required TREE DBC NODE PERIOD_MS LEAVES)
     if(NOT APP_${required})
       message(FATAL_ERROR "canopy_add_application(${NAME}): ${required} is missing")
@@ -61,7 +64,7 @@ function(canopy_add_application NAME)
     set(trace_dbc "${folder}/${NAME}_trace.dbc")
   endif()
   foreach(option MAIN_TREE INCLUDE BITRATE FOREIGN_LOAD FOREIGN_BURST TX_LATENCY_US TRACE TRACE_ENTRIES TRACE_GUARD
-                 MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
+                 TRACE_TICKS MAX_RAM MAX_FLASH IMAGE_NODES IMAGE_USES)
     if(DEFINED APP_${option})
       string(TOLOWER "${option}" flag)
       string(REPLACE "_" "-" flag "${flag}")
@@ -77,6 +80,13 @@ function(canopy_add_application NAME)
   endif()
   foreach(pair IN LISTS APP_TYPE_MAP)
     list(APPEND options --type-map "${pair}")
+  endforeach()
+  foreach(place IN LISTS APP_SEARCH) # the build runs elsewhere
+    cmake_path(ABSOLUTE_PATH place BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+    list(APPEND options --search "${place}")
+  endforeach()
+  foreach(name IN LISTS APP_FOREIGN)
+    list(APPEND options --foreign "${name}")
   endforeach()
   foreach(pair IN LISTS APP_ROS_PACKAGE) # the build runs elsewhere
     string(REGEX MATCH "^([^=]*)=(.*)$" matched "${pair}")
@@ -98,7 +108,7 @@ function(canopy_add_application NAME)
 endfunction()
 
 function(canopy_add_image NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 IMAGE "" "TREE;FOR" "")
+  cmake_parse_arguments(PARSE_ARGV 1 IMAGE "MODEL" "TREE;FOR" "")
   if(NOT IMAGE_TREE OR NOT IMAGE_FOR OR IMAGE_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "canopy_add_image(${NAME}): TREE and FOR must be given, and nothing else")
   endif()
@@ -106,10 +116,14 @@ function(canopy_add_image NAME)
   cmake_path(ABSOLUTE_PATH IMAGE_TREE BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/generated/${IMAGE_FOR}")
   set(image "${folder}/${NAME}.img")
+  set(model "")
+  if(IMAGE_MODEL)
+    set(model --model)
+  endif()
   add_custom_command(
     OUTPUT "${image}"
     COMMAND "${CANOPY_PYTHON}" -I -m canopy image build "${IMAGE_TREE}" --for "${folder}/${IMAGE_FOR}.model.json"
-            --output "${image}" --depfile "${image}.d"
+            --output "${image}" --depfile "${image}.d" ${model}
     DEPENDS "${IMAGE_TREE}" "${folder}/${IMAGE_FOR}.model.json" ${compiler}
     DEPFILE "${image}.d" # the files that the tree includes
     COMMENT "canopy image ${NAME} for ${IMAGE_FOR}"

@@ -15,6 +15,12 @@
 #include "canopy/clock/posix.h"
 #include "canopy/clock/replay_files.h"
 #include "canopy/loop.h"
+#ifdef CANOPY_IMAGE
+#include "canopy/image.h"
+
+extern const canopy_image_app_t CANOPY_IMAGE;
+enum { IMAGE_MAX = 65536 };
+#endif
 
 #define SIMULATION_STEP_ID 0x700u /* SimulationStep of nao.dbc */
 
@@ -26,6 +32,7 @@ typedef struct {
     const char *can;
     const char *replay;
     const char *sent;
+    const char *image;
     uint32_t ticks; /* 0: until a signal comes */
     bool lock_step;
     bool quiet;
@@ -38,20 +45,27 @@ static canopy_replay_files_t replay;
 static canopy_loop_t loop;
 static options_t options;
 
+#ifdef CANOPY_IMAGE
+#define IMAGE_USAGE " [--image FILE]"
+#define IMAGE_HELP "  --image FILE  another tree for this program, which `canopy image build` makes\n"
+#else
+#define IMAGE_USAGE ""
+#define IMAGE_HELP ""
+#endif
+
 static void print_help(FILE *file)
 {
     fprintf(
         file,
-        "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]\n"
-        "       %s --replay FILE [--sent FILE] [--quiet]\n\n"
+        "Usage: %s --can BUS [--lock-step] [--ticks N] [--quiet]" IMAGE_USAGE "\n"
+        "       %s --replay FILE [--sent FILE] [--quiet]" IMAGE_USAGE "\n\n"
         "Runs the controller on a CAN bus until SIGINT or SIGTERM, or replays a record of an earlier run.\n\n"
         "  --can BUS     socketcan:INTERFACE, unixbus:NAME or unixbus:/FOLDER\n"
         "  --lock-step   one tick for each step of canopy-sim --lock-step, instead of one every %" PRIu64 " ms\n"
         "  --ticks N     end after N ticks\n"
         "  --replay FILE the record of an earlier run, which `canopy replay --keep` makes of a log of the bus\n"
         "  --sent FILE   with --replay: write the frames that the controller sends to a file, for `canopy replay`\n"
-        "  --quiet       no summary at the end\n"
-        "  --help        this text\n\n"
+        "  --quiet       no summary at the end\n" IMAGE_HELP "  --help        this text\n\n"
         "Examples:\n"
         "  %s --can socketcan:vcan0\n"
         "  %s --can unixbus:bus0 --lock-step --ticks 2000\n"
@@ -95,10 +109,17 @@ static void check(const options_t *given, bool more)
 static options_t parse(int argc, char **argv)
 {
     static const struct option known[] = {
-        {"can", required_argument, NULL, 'c'},   {"lock-step", no_argument, NULL, 'l'},
-        {"ticks", required_argument, NULL, 't'}, {"replay", required_argument, NULL, 'r'},
-        {"sent", required_argument, NULL, 's'},  {"quiet", no_argument, NULL, 'q'},
-        {"help", no_argument, NULL, 'h'},        {NULL, 0, NULL, 0},
+        {"can", required_argument, NULL, 'c'},
+        {"lock-step", no_argument, NULL, 'l'},
+        {"ticks", required_argument, NULL, 't'},
+        {"replay", required_argument, NULL, 'r'},
+        {"sent", required_argument, NULL, 's'},
+        {"quiet", no_argument, NULL, 'q'},
+        {"help", no_argument, NULL, 'h'},
+#ifdef CANOPY_IMAGE
+        {"image", required_argument, NULL, 'i'},
+#endif
+        {NULL, 0, NULL, 0},
     };
     options_t result = {0};
     int option;
@@ -122,6 +143,9 @@ static options_t parse(int argc, char **argv)
             break;
         case 'q':
             result.quiet = true;
+            break;
+        case 'i':
+            result.image = optarg;
             break;
         case 'h':
             print_help(stdout);
@@ -254,6 +278,37 @@ static canopy_error_t close_bus(void)
     return error;
 }
 
+#ifdef CANOPY_IMAGE
+/** Lets the tree of an image begin, if one was asked for. @return false: the message says why. */
+static bool run_image(char *message, size_t size)
+{
+    static uint8_t bytes[IMAGE_MAX];
+    const canopy_clock_t *clock = loop.config->clock;
+    uint16_t where = 0;
+    FILE *file = options.image != NULL ? fopen(options.image, "rb") : NULL;
+    size_t length;
+    canopy_image_error_t error;
+
+    if (options.image == NULL) {
+        return true;
+    }
+    if (file == NULL) {
+        (void)snprintf(message, size, "%s: cannot be read", options.image);
+        return false;
+    }
+    length = fread(bytes, 1, sizeof bytes, file);
+    (void)fclose(file);
+    error = canopy_image_load(&CANOPY_IMAGE, bytes, length, &where);
+    if (error != CANOPY_IMAGE_OK) {
+        (void)snprintf(message, size, "%s: is not a tree image for this program: error %d at %u; build it again",
+                       options.image, (int)error, (unsigned)where);
+        return false;
+    }
+    (void)canopy_image_run(&CANOPY_IMAGE, &loop, clock->now(clock->context));
+    return true;
+}
+#endif
+
 int main(int argc, char **argv)
 {
     char message[CANOPY_CAN_OPEN_MESSAGE > CANOPY_REPLAY_MESSAGE ? CANOPY_CAN_OPEN_MESSAGE : CANOPY_REPLAY_MESSAGE];
@@ -271,6 +326,12 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s: the application's tables are not complete: error %d\n", CANOPY_APP.name, (int)error);
         return EXIT_FAILURE;
     }
+#ifdef CANOPY_IMAGE
+    if (!run_image(message, sizeof message)) {
+        fprintf(stderr, "%s: %s\n", CANOPY_APP.name, message);
+        return EXIT_FAILURE;
+    }
+#endif
     stopped = canopy_loop_run(&loop);
     if (!options.quiet) {
         print_summary(config.can);

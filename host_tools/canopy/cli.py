@@ -14,6 +14,7 @@ from canopy.escape.terminal import CleanCommand, echo
 # Name -> module that holds the click command `command`, and the line shown in --help.
 SUBCOMMANDS = {
     "compile": ("canopy.compiler.cli", "Compile a tree and a DBC to C."),
+    "model": ("canopy.tree.model_cli", "Write the declarations that tree files lack, guessed from use."),
     "image": ("canopy.compiler.image_cli", "Compile a tree for a firmware that is there, as bytes to load."),
     "codec": ("canopy.compiler.codec_cli", "Make the C codec of a DBC, without a tree."),
     "check": ("canopy.check.cli", "Find mistakes in a tree before the robot does."),
@@ -24,6 +25,7 @@ SUBCOMMANDS = {
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
     "buses": ("canopy.can_bus.buses", "List the CAN buses of this machine."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
+    "sim": ("canopy.live.robot_command", "Tell the simulated robot something."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),
     "record": ("canopy.record", "Record a bus to a log that can be replayed."),
     "replay": ("canopy.replay.cli", "Run the program again on a log, and compare it bit for bit."),

@@ -26,6 +26,7 @@ _TEXT_MAX = 1000
 DATA_ID_MAX = 0xFFFF
 SLOTS_MAX = 4096
 CHANGES_MAX = 32
+TICKS_MAX = 1_000
 KNOWN_MS_MAX = 2**53
 
 T = TypeVar("T")
@@ -83,8 +84,12 @@ class Model:
         return depth
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path, *, traced: bool = True) -> Model:
     """Reads and checks a model file.
+
+    Args:
+        path: The file.
+        traced: Whether the application must have a trace, for who watches it on its bus.
 
     Raises:
         ModelError: The file or its DBC is not there, or is not what `canopy compile` of this version writes.
@@ -97,7 +102,7 @@ def load_model(path: Path) -> Model:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ModelError(f"{path}: is no JSON: {error}") from error
-    reader = _Reader(path, data)
+    reader = _Reader(path, data, traced=traced)
     model = reader.model()
     if not os.path.isfile(model.dbc):  # Path.is_file() raises where the name is too long
         raise reader.error("bus.dbc", f"{model.dbc} is not there; it is written beside the model file")
@@ -107,9 +112,10 @@ def load_model(path: Path) -> Model:
 class _Reader:
     """Takes values out of the parsed JSON and names the place of the first one that is not as it should be."""
 
-    def __init__(self, path: Path, data: Any) -> None:
+    def __init__(self, path: Path, data: Any, *, traced: bool) -> None:
         self._path = path
         self._data = data
+        self._traced = traced
         self._node_count = 0
 
     def model(self) -> Model:
@@ -190,6 +196,8 @@ class _Reader:
 
     def _trace(self, data: dict[str, Any]) -> Trace:
         if "trace" in data and data["trace"] is None:
+            if not self._traced:
+                return Trace(base=0, extended=False, guard=None, changes_max=1, known_within_ms=0, values=(), texts=())
             raise self.error(
                 "trace",
                 "is null: the application was built without a trace, so nothing can be watched; build it with "
@@ -214,6 +222,7 @@ class _Reader:
             base=self._number(trace, where, "base", 0, (2**29 if extended else 2**11) - len(MESSAGES)),
             extended=extended,
             guard=guard,
+            ticks=self._number(trace, where, "ticks", 1, TICKS_MAX),
             changes_max=self._number(trace, where, "changes_max", 1, CHANGES_MAX),
             known_within_ms=self._number(trace, where, "known_within_ms", 0, KNOWN_MS_MAX),
             values=values,

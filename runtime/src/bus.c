@@ -6,22 +6,19 @@
 
 #define MS UINT32_C(1000) /* [us] */
 
-/** Order of the table: standard ids before extended ones. */
-static uint32_t rank(const canopy_rx_message_t *message)
+/** Order of the table: standard ids before extended ones, and behind all the driver's error frames: no message is one. */
+static uint32_t rank(uint32_t id, uint8_t flags)
 {
-    return message->id | ((message->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u);
+    return id | ((uint32_t)(flags & (CANOPY_CAN_EXTENDED | CANOPY_CAN_ERROR)) << 29);
 }
 
-/** The rank that a message must have to be this frame. The driver's error frames are behind all: no message is one. */
-static uint32_t rank_of(const canopy_can_frame_t *frame)
+static uint32_t rank_at(const canopy_bus_t *bus, uint16_t index)
 {
-    uint32_t extended = (frame->flags & CANOPY_CAN_EXTENDED) != 0u ? UINT32_C(0x40000000) : 0u;
-    uint32_t error = (frame->flags & CANOPY_CAN_ERROR) != 0u ? UINT32_C(0x80000000) : 0u;
-
-    return frame->id | extended | error;
+    return rank(bus->rx[index].id, bus->rx[index].flags);
 }
 
-static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
+/** The message with this rank; `rx_count`: there is none. */
+static uint16_t search(const canopy_bus_t *bus, uint32_t wanted)
 {
     uint16_t low = 0;
     uint16_t high = bus->rx_count;
@@ -29,16 +26,28 @@ static uint16_t find(const canopy_bus_t *bus, uint32_t wanted)
     while (low < high) {
         uint16_t middle = (uint16_t)((low + high) / 2u);
 
-        if (rank(&bus->rx[middle]) < wanted) {
+        if (rank_at(bus, middle) < wanted) {
             low = (uint16_t)(middle + 1u);
         } else {
             high = middle;
         }
     }
-    if (low < bus->rx_count && rank(&bus->rx[low]) == wanted) {
-        return low;
+    return low < bus->rx_count && rank_at(bus, low) == wanted ? low : bus->rx_count;
+}
+
+/** As search(). Frames that wait at the same time come in the order of their ids, so the next message is a good guess. */
+static uint16_t find(canopy_bus_state_t *self, uint32_t wanted)
+{
+    const canopy_bus_t *bus = self->bus;
+    uint16_t index = self->expected;
+
+    if (index >= bus->rx_count || rank_at(bus, index) != wanted) {
+        index = search(bus, wanted);
     }
-    return bus->rx_count;
+    if (index < bus->rx_count) {
+        self->expected = (uint16_t)(index + 1u) < bus->rx_count ? (uint16_t)(index + 1u) : 0u;
+    }
+    return index;
 }
 
 static bool form_fits(const canopy_rx_message_t *message, const canopy_can_frame_t *frame)
@@ -59,16 +68,13 @@ uint8_t canopy_bus_check(uint8_t check, uint32_t id, const uint8_t *data, uint8_
     return result;
 }
 
-/** Age of a frame, in whole ms, rounded up; CANOPY_AGE_MAX at most. */
-static uint16_t age_in_ms(canopy_time_t now, canopy_time_t arrived)
+/** An age in whole ms, rounded up; CANOPY_AGE_MAX at most. */
+static uint16_t age_in_ms(canopy_time_t age)
 {
-    canopy_time_t age = now - arrived;
-
-    if (!canopy_time_reached(now, arrived)) {
-        return 0; /* it has come since the cycle began */
+    if (age <= MS * (CANOPY_AGE_MAX - 1u)) {
+        return (uint16_t)(((uint32_t)age + MS - 1u) / MS); /* in 32 bits: there is a divider for them */
     }
-    /* In 32 bits: there is a divider for them. */
-    return age <= MS * (CANOPY_AGE_MAX - 1u) ? (uint16_t)(((uint32_t)age + MS - 1u) / MS) : CANOPY_AGE_MAX;
+    return canopy_time_reached(age, 0) ? CANOPY_AGE_MAX : 0u; /* 0: it has come since the cycle began */
 }
 
 /** Notes when the values arrived that are in the input image now. What is not told in whole ms is not known. */
@@ -81,7 +87,7 @@ static void note_arrival(canopy_rx_state_t *state, const canopy_rx_message_t *me
 
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
 {
-    uint16_t index = find(self->bus, rank_of(frame));
+    uint16_t index = find(self, rank(frame->id, frame->flags));
     const canopy_rx_message_t *message;
     canopy_rx_state_t *state;
 
@@ -112,7 +118,7 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
         return;
     }
     canopy_count(&self->counters.accepted);
-    note_arrival(state, message, age_in_ms(now, frame->time), now);
+    note_arrival(state, message, age_in_ms(now - frame->time), now);
 }
 
 /** What a replay must know of a message in this tick goes into the check. */
@@ -127,15 +133,15 @@ static void begin_message(canopy_bus_state_t *self, uint16_t index, canopy_time_
 {
     const canopy_rx_message_t *message = &self->bus->rx[index];
     canopy_rx_state_t *state = &self->rx[index];
-    bool in_time = message->timeout == 0u || !canopy_time_reached(now, state->arrived_at + message->timeout);
-    bool fresh = state->received && in_time;
+    canopy_time_t age = now - state->arrived_at;
+    bool fresh = state->received && (message->timeout == 0u || age < message->timeout);
 
     if (state->fresh && !fresh) {
         canopy_count(&self->counters.timeouts);
     }
     state->received = fresh;
     state->fresh = fresh;
-    message->set_age(self->input, fresh, fresh ? age_in_ms(now, state->arrived_at) : CANOPY_AGE_MAX);
+    message->set_age(self->input, fresh, fresh ? age_in_ms(age) : CANOPY_AGE_MAX);
     if (state->taken) {
         check_age(self, state->age_ms);
     }
@@ -168,6 +174,17 @@ void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, cano
 {
     for (uint16_t index = 0; index < self->bus->tx_count; index++) {
         canopy_tx_post(tx, index, self->output, until);
+    }
+}
+
+void canopy_bus_commit_owed(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until)
+{
+    for (uint16_t index = 0; index < self->bus->tx_count; index++) {
+        if (canopy_tx_owes(tx, index)) {
+            canopy_tx_post(tx, index, self->output, until);
+        } else {
+            canopy_tx_hold(tx);
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 #include <stddef.h>
 
 #include "trace_parts.h"
+#include "tx_parts.h"
 
 enum { LATENESS_FIRST_US = 16 };
 
@@ -128,27 +129,49 @@ static bool has_lost(canopy_loop_t *self)
     return true;
 }
 
+/** Reports what a counter has grown by since the last cycle. */
+static void account_for(const canopy_loop_t *self, canopy_fault_t fault, uint32_t counter, uint32_t *before)
+{
+    if (counter != *before) {
+        report(self, fault, counter - *before);
+        *before = counter;
+    }
+}
+
 static void account_for_bus(canopy_loop_t *self, canopy_can_state_t before)
 {
-    canopy_tx_counters_t counters;
-    uint32_t late;
+    const canopy_tx_t *tx = self->config->app->tx;
 
     if (self->can_manager.state != before) {
         report(self, CANOPY_FAULT_CAN_STATE, (uint32_t)self->can_manager.state);
     }
-    canopy_tx_count(self->config->app->tx, &counters);
-    late = canopy_sum(counters.expired, counters.replaced); /* a value that is replaced was not out in its cycle */
-    if (late != self->tx_expired) {
-        report(self, CANOPY_FAULT_TX_EXPIRED, late - self->tx_expired);
-        self->tx_expired = late;
-    }
+    account_for(self, CANOPY_FAULT_TX_EXPIRED, canopy_tx_expired(tx), &self->tx_expired);
+    account_for(self, CANOPY_FAULT_TX_REPLACED, canopy_tx_replaced(tx), &self->tx_replaced);
 }
 
-/** What was decided for a bus that was not there must not be the first thing on it: safe values, until they are out. */
+static bool owes_any(const canopy_app_t *app)
+{
+    for (uint16_t message = 0; message < app->bus->tx_count; message++) {
+        if (canopy_tx_owes(app->tx, message)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/**
+ * What was decided for a bus that was not there must not be the first thing on it: safe values, until one of each message
+ * is out. Not all in one cycle: a slow bus would never be done.
+ */
 static bool is_returning(const canopy_loop_t *self)
 {
-    return canopy_can_is_unusable(self->can_manager.state) ||
-           (self->returning && !canopy_tx_is_out(self->config->app->tx));
+    const canopy_app_t *app = self->config->app;
+
+    if (canopy_can_is_unusable(self->can_manager.state)) {
+        canopy_tx_owe(app->tx);
+        return true;
+    }
+    return self->returning && owes_any(app);
 }
 
 /** In a replay the bus is what it was. */
@@ -163,15 +186,18 @@ static void take_recorded_conditions(canopy_loop_t *self, canopy_cycle_t *cycle)
         cycle->can_state = (canopy_can_state_t)conditions.can_state;
         self->can_manager.state = cycle->can_state;
         self->returning = conditions.returning;
+        if (self->returning) {
+            canopy_tx_owe(self->config->app->tx); /* which ones still did, nobody has recorded */
+        }
     }
 }
 
 /** What this tick works with: frames, time, and the state of the bus. */
-static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
+static void read_inputs(canopy_loop_t *self, canopy_cycle_t *cycle)
 {
     const canopy_app_t *app = self->config->app;
+    const canopy_time_t now = cycle->now;
     canopy_can_state_t before = self->can_manager.state;
-    canopy_cycle_t cycle = {.now = now};
     bool lasts;
     bool lost;
 
@@ -180,23 +206,22 @@ static canopy_cycle_t read_inputs(canopy_loop_t *self, canopy_time_t now)
     }
     lasts = backlog_lasts(self, drain(self, now));
     lost = has_lost(self);
-    cycle.overload = lasts || lost;
-    cycle.can_state =
+    cycle->overload = lasts || lost;
+    cycle->can_state =
         canopy_can_manager_step(&self->can_manager, self->config->can, canopy_tx_is_blocked(app->tx), now);
     self->returning = is_returning(self);
-    take_recorded_conditions(self, &cycle);
+    take_recorded_conditions(self, cycle);
     account_for_bus(self, before);
-    return cycle;
 }
 
-/** Posts what the tree wants, or the safe values of all messages while the bus is returning. */
+/** Posts what the tree wants, or while the bus is returning the safe values that are not out yet. */
 static void write_outputs(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
 
     if (self->returning) {
         app->bus->reset_output(app->output);
-        canopy_bus_commit_all(app->bus_state, app->tx, now + app->period);
+        canopy_bus_commit_owed(app->bus_state, app->tx, now + app->period);
     } else {
         canopy_bus_commit(app->bus_state, app->tx, self->ticks, now);
     }
@@ -205,8 +230,9 @@ static void write_outputs(canopy_loop_t *self, canopy_time_t now)
 static void send_trace(canopy_loop_t *self, const canopy_cycle_t *cycle, canopy_status_t root)
 {
     const canopy_app_t *app = self->config->app;
-    canopy_time_t until = cycle->now + CANOPY_TRACE_PERIODS * app->period;
+    canopy_time_t until = cycle->now + (CANOPY_TRACE_PERIODS + app->trace_ticks) * app->period;
 
+    canopy_tx_resume_trace(app->tx);
     canopy_trace_send(app->trace, app->trace_state, app->tree_instance, app->tx,
                       &(canopy_trace_tick_t){.tick = self->ticks,
                                              .root = root,
@@ -222,9 +248,10 @@ canopy_status_t canopy_loop_cycle(canopy_loop_t *self, canopy_time_t now)
 {
     const canopy_app_t *app = self->config->app;
     uint32_t faults = app->tree_instance->faults;
-    canopy_cycle_t cycle = read_inputs(self, now);
+    canopy_cycle_t cycle = {.now = now};
     canopy_status_t root;
 
+    read_inputs(self, &cycle);
     canopy_bus_begin_tick(app->bus_state, &cycle);
     root = canopy_tree_tick(app->tree_instance, now);
     write_outputs(self, now);

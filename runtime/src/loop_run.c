@@ -7,7 +7,8 @@
 enum { STOP_WAIT_US = 1000, STOP_POLLS_MAX = 100000 };
 
 /**
- * Serves the transmit side until everything is out, the trace behind the commands too, or the time is over.
+ * Serves the transmit side until everything is out, the trace behind the commands too, or the time is over. What is left of
+ * the trace then is dropped.
  * @return true: every command is out.
  */
 static bool flush(canopy_loop_t *self, canopy_time_t until)
@@ -30,6 +31,8 @@ static bool flush(canopy_loop_t *self, canopy_time_t until)
         last = now;
         canopy_tx_kick(tx, now);
     }
+    canopy_tx_stop_trace(tx);
+    canopy_tx_kick(tx, now);
     return canopy_tx_is_out(tx);
 }
 

@@ -13,6 +13,8 @@ static void start_slot(canopy_tx_slot_t *slot)
     atomic_init(&slot->out, UINT32_MAX);
     atomic_init(&slot->reading, 0u);
     slot->posted = 0;
+    slot->owed_after = 0;
+    slot->owes = false;
     slot->taken = 0;
     slot->counter = 0;
     slot->flying = false;
@@ -21,8 +23,11 @@ static void start_slot(canopy_tx_slot_t *slot)
 static void start_trace_and_counters(canopy_tx_t *self)
 {
     self->trace_full = 0;
+    self->held = 0;
+    self->in_flight = 0;
     self->trace_flying = false;
     self->watching = false;
+    atomic_init(&self->trace_stopped, false);
     atomic_init(&self->trace_head, 0u);
     atomic_init(&self->trace_tail, 0u);
     atomic_init(&self->busy, false);
@@ -84,6 +89,30 @@ void canopy_tx_post(canopy_tx_t *self, uint16_t message, const void *output, can
     atomic_store_explicit(&slot->latest, (slot->posted << 2) | (buffer << 1) | 1u, memory_order_release);
 }
 
+void canopy_tx_owe(canopy_tx_t *self)
+{
+    for (uint16_t index = 0; index < self->count; index++) {
+        self->slots[index].owed_after = self->slots[index].posted;
+        self->slots[index].owes = true;
+    }
+}
+
+bool canopy_tx_owes(canopy_tx_t *self, uint16_t message)
+{
+    canopy_tx_slot_t *slot = &self->slots[message];
+    uint32_t out = atomic_load_explicit(&slot->out, memory_order_relaxed);
+    uint32_t since_out = (slot->posted - out) & CANOPY_TX_VERSION_MAX;
+    uint32_t since_owed = (slot->posted - slot->owed_after) & CANOPY_TX_VERSION_MAX;
+
+    slot->owes = slot->owes && (out == UINT32_MAX || since_out >= since_owed);
+    return slot->owes;
+}
+
+void canopy_tx_hold(canopy_tx_t *self)
+{
+    canopy_count(&self->held);
+}
+
 void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy_tx_trace_data_t *data,
                      canopy_time_t until)
 {
@@ -101,6 +130,11 @@ void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy
     atomic_store_explicit(&self->trace_head, head + 1u, memory_order_release);
 }
 
+void canopy_tx_stop_trace(canopy_tx_t *self)
+{
+    atomic_store_explicit(&self->trace_stopped, true, memory_order_relaxed);
+}
+
 void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)
 {
     if (self->can->request != NULL) {
@@ -108,16 +142,6 @@ void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)
     } else {
         canopy_tx_service(self, now);
     }
-}
-
-bool canopy_tx_is_busy(const canopy_tx_t *self)
-{
-    return atomic_load_explicit(&self->busy, memory_order_relaxed);
-}
-
-bool canopy_tx_is_blocked(const canopy_tx_t *self)
-{
-    return atomic_load_explicit(&self->blocked, memory_order_relaxed);
 }
 
 bool canopy_tx_is_out(const canopy_tx_t *self)
@@ -136,8 +160,8 @@ bool canopy_tx_is_out(const canopy_tx_t *self)
 void canopy_tx_count(const canopy_tx_t *self, canopy_tx_counters_t *counters)
 {
     counters->sent = atomic_load_explicit(&self->sent, memory_order_relaxed);
-    counters->replaced = atomic_load_explicit(&self->replaced, memory_order_relaxed);
-    counters->expired = atomic_load_explicit(&self->expired, memory_order_relaxed);
+    counters->replaced = canopy_tx_replaced(self);
+    counters->expired = canopy_tx_expired(self);
     counters->trace_sent = atomic_load_explicit(&self->trace_sent, memory_order_relaxed);
     counters->trace_dropped =
         canopy_sum(self->trace_full, atomic_load_explicit(&self->trace_late, memory_order_relaxed));

@@ -3,6 +3,7 @@
 #ifndef CANOPY_TX_PARTS_H
 #define CANOPY_TX_PARTS_H
 
+#include "canopy/count.h"
 #include "canopy/tx.h"
 
 /** Versions are counted modulo this + 1: 30 bits, what canopy_tx_slot_t.latest has room for. */
@@ -14,6 +15,18 @@ static inline uint8_t *canopy_tx_buffer(const canopy_tx_t *self, uint16_t index,
     const canopy_tx_message_t *message = &self->messages[index];
 
     return &self->data[message->place + buffer * message->length];
+}
+
+/** As canopy_tx_counters_t.replaced. Loop's thread. */
+static inline uint32_t canopy_tx_replaced(const canopy_tx_t *self)
+{
+    return canopy_sum(self->held, atomic_load_explicit(&self->replaced, memory_order_relaxed));
+}
+
+/** As canopy_tx_counters_t.expired. Loop's thread. */
+static inline uint32_t canopy_tx_expired(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->expired, memory_order_relaxed);
 }
 
 #endif

@@ -40,15 +40,6 @@ static bool waits(const canopy_tx_slot_t *slot)
     return latest != 0u && latest >> 2 != slot->taken && !slot->flying;
 }
 
-/** The most urgent message that waits, from `index` on; `count`: none. */
-static uint16_t next_message(const canopy_tx_t *self, uint16_t index)
-{
-    while (index < self->count && !waits(&self->slots[index])) {
-        index++;
-    }
-    return index;
-}
-
 /** The oldest trace frame gives up its place. */
 static void forget_trace(canopy_tx_t *self)
 {
@@ -58,27 +49,32 @@ static void forget_trace(canopy_tx_t *self)
 }
 
 /** A frame is out: the bus lets frames through. */
-static void note_out(canopy_tx_t *self, const canopy_tx_mailbox_t *box)
+static void note_free(canopy_tx_t *self)
 {
-    if (box->what == CANOPY_TX_TRACE) {
-        forget_trace(self);
-        add(&self->trace_sent, 1u);
-    } else {
-        canopy_tx_slot_t *slot = &self->slots[box->what - 1u];
-
-        atomic_store_explicit(&slot->out, box->version, memory_order_relaxed);
-        slot->counter = (uint8_t)(slot->counter + 1u < CANOPY_E2E_COUNTERS ? slot->counter + 1u : 0u);
-        add(&self->sent, 1u);
-    }
     self->watching = false;
     atomic_store_explicit(&self->blocked, false, memory_order_relaxed);
 }
 
-/** A command is not out and never will be; a trace frame just waits again. */
-static void note_aborted(canopy_tx_t *self, const canopy_tx_mailbox_t *box, canopy_time_t now)
+static void note_command_out(canopy_tx_t *self, canopy_tx_slot_t *slot, uint32_t version)
 {
-    canopy_tx_slot_t *slot = &self->slots[box->what - 1u];
+    const uint8_t counter = slot->counter;
 
+    atomic_store_explicit(&slot->out, version, memory_order_relaxed);
+    slot->counter = counter != CANOPY_E2E_COUNTERS - 1u ? (uint8_t)(counter + 1u) : 0u;
+    add(&self->sent, 1u);
+    note_free(self);
+}
+
+static void note_trace_out(canopy_tx_t *self)
+{
+    forget_trace(self);
+    add(&self->trace_sent, 1u);
+    note_free(self);
+}
+
+/** A command is not out and never will be. */
+static void note_aborted(canopy_tx_t *self, canopy_tx_slot_t *slot, const canopy_tx_mailbox_t *box, canopy_time_t now)
+{
     if (canopy_time_reached(now, box->until)) {
         add(&self->expired, 1u);
     } else if (is_replaced(slot, box->version)) {
@@ -88,32 +84,33 @@ static void note_aborted(canopy_tx_t *self, const canopy_tx_mailbox_t *box, cano
     }
 }
 
-static void set_flying(canopy_tx_t *self, const canopy_tx_mailbox_t *box, bool flying)
-{
-    if (box->what == CANOPY_TX_TRACE) {
-        self->trace_flying = flying;
-    } else {
-        self->slots[box->what - 1u].flying = flying;
-    }
-}
-
-/** Takes note of what has become of the frame in a mailbox, which `box` describes. */
-static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_mailbox_t *box,
-                                   canopy_time_t now)
+/** Takes note of what has become of the frame in a mailbox. */
+static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
 {
     const canopy_can_t *can = self->can;
+    canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
     canopy_can_outcome_t outcome = can->outcome(can->context, mailbox);
 
     if (outcome == CANOPY_CAN_PENDING) {
         return outcome;
     }
-    set_flying(self, box, false);
-    if (outcome == CANOPY_CAN_SENT) {
-        note_out(self, box);
-    } else if (box->what != CANOPY_TX_TRACE) {
-        note_aborted(self, box, now);
+    if (box->what == CANOPY_TX_TRACE) {
+        self->trace_flying = false;
+        if (outcome == CANOPY_CAN_SENT) {
+            note_trace_out(self); /* else it waits again, where it was */
+        }
+    } else {
+        canopy_tx_slot_t *slot = &self->slots[box->what - 1u];
+
+        slot->flying = false;
+        if (outcome == CANOPY_CAN_SENT) {
+            note_command_out(self, slot, box->version);
+        } else {
+            note_aborted(self, slot, box, now);
+        }
     }
-    self->mailboxes[mailbox].what = 0;
+    box->what = 0;
+    self->in_flight--;
     return outcome;
 }
 
@@ -127,7 +124,22 @@ static bool take_back(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
     }
     box->aborting = true;
     self->can->abort(self->can->context, mailbox);
-    return settle(self, mailbox, box, now) != CANOPY_CAN_PENDING;
+    return settle(self, mailbox, now) != CANOPY_CAN_PENDING;
+}
+
+static bool trace_is_stopped(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->trace_stopped, memory_order_relaxed);
+}
+
+/** Must the frame in a mailbox not get out any more? */
+static bool is_void(const canopy_tx_t *self, const canopy_tx_mailbox_t *box, canopy_time_t now)
+{
+    if (canopy_time_reached(now, box->until)) {
+        return true;
+    }
+    return box->what == CANOPY_TX_TRACE ? trace_is_stopped(self)
+                                        : is_replaced(&self->slots[box->what - 1u], box->version);
 }
 
 /** Empties mailboxes: what is out, and what must not get out any more. */
@@ -136,16 +148,12 @@ static void collect(canopy_tx_t *self, canopy_time_t now)
     for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
         const canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
 
-        if (box->what == 0u || settle(self, mailbox, box, now) != CANOPY_CAN_PENDING) {
+        if (box->what == 0u || settle(self, mailbox, now) != CANOPY_CAN_PENDING) {
             continue;
         }
-        if (canopy_time_reached(now, box->until) ||
-            (box->what != CANOPY_TX_TRACE && is_replaced(&self->slots[box->what - 1u], box->version))) {
+        if (is_void(self, box, now)) {
             (void)take_back(self, mailbox, now);
         }
-    }
-    if (self->watching && canopy_time_reached(now, self->watched_until)) {
-        atomic_store_explicit(&self->blocked, true, memory_order_relaxed);
     }
 }
 
@@ -155,6 +163,9 @@ static uint8_t find_mailbox(canopy_tx_t *self, uint32_t what, canopy_time_t now)
     uint8_t least = NO_MAILBOX;
     uint32_t least_what = what;
 
+    if (self->in_flight == 0u) {
+        return 0;
+    }
     for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
         const canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
 
@@ -170,100 +181,106 @@ static uint8_t find_mailbox(canopy_tx_t *self, uint32_t what, canopy_time_t now)
 }
 
 /** From now on only a newer value of the message waits. */
-static void take(canopy_tx_t *self, const canopy_tx_mailbox_t *box)
+static void take(canopy_tx_t *self, canopy_tx_slot_t *slot, uint32_t version)
 {
-    canopy_tx_slot_t *slot = &self->slots[box->what - 1u];
-
-    add(&self->replaced, (box->version - slot->taken - 1u) & CANOPY_TX_VERSION_MAX);
-    slot->taken = box->version;
+    add(&self->replaced, (version - slot->taken - 1u) & CANOPY_TX_VERSION_MAX);
+    slot->taken = version;
 }
 
 /**
- * Hands a frame to a mailbox, which `box` then describes.
- * @return as send() of the driver; 0 too when the frame has come back at once: it waits for the next service
+ * The driver has taken a frame, which is in its mailbox until it has its outcome.
+ * @return 1; 0 when the frame has come back at once: it waits for the next service
  */
-static int load(canopy_tx_t *self, uint8_t mailbox, const canopy_can_frame_t *frame, const canopy_tx_mailbox_t *box)
+static int fly(canopy_tx_t *self, uint8_t mailbox, canopy_tx_mailbox_t box, canopy_time_t now)
 {
-    const canopy_can_t *can = self->can;
-    int result = can->send(can->context, mailbox, frame);
-
-    if (result != 1) {
-        watch(self, box->until);
-        return result;
+    watch(self, box.until);
+    self->mailboxes[mailbox] = box;
+    self->in_flight++;
+    if (box.what == CANOPY_TX_TRACE) {
+        self->trace_flying = true;
+    } else {
+        self->slots[box.what - 1u].flying = true;
     }
-    if (box->what != CANOPY_TX_TRACE) {
-        take(self, box);
-    }
-    if (can->outcome == NULL) {
-        note_out(self, box);
-        return 1;
-    }
-    watch(self, box->until);
-    self->mailboxes[mailbox] = *box;
-    set_flying(self, box, true);
-    return settle(self, mailbox, box, frame->time) != CANOPY_CAN_ABORTED ? 1 : 0;
+    return settle(self, mailbox, now) != CANOPY_CAN_ABORTED ? 1 : 0;
 }
 
 /**
- * Copies what was posted last, unless the loop is just writing it.
+ * Copies what was posted last, unless the loop is just writing it: its bytes into `data`, what else it is into `box`.
  * @return false: it cannot be had now; the loop asks for another service when it has written.
  */
-static bool copy(canopy_tx_t *self, uint16_t index, canopy_can_frame_t *frame, canopy_tx_mailbox_t *box)
+static bool copy(canopy_tx_t *self, uint16_t index, uint8_t *data, canopy_tx_mailbox_t *box)
 {
-    const canopy_tx_message_t *message = &self->messages[index];
     canopy_tx_slot_t *slot = &self->slots[index];
     uint32_t latest = atomic_load_explicit(&slot->latest, memory_order_relaxed);
     uint32_t buffer = (latest >> 1) & 1u;
-    const uint8_t *data = canopy_tx_buffer(self, index, buffer);
 
     atomic_store(&slot->reading, (uint8_t)(buffer + 1u));
     if (latest == 0u || atomic_load(&slot->latest) != latest) {
         atomic_store_explicit(&slot->reading, 0u, memory_order_release);
         return false;
     }
-    memcpy(frame->data, data, message->length);
-    box->until = slot->until[buffer];
+    memcpy(data, canopy_tx_buffer(self, index, buffer), self->messages[index].length);
+    *box = (canopy_tx_mailbox_t){
+        .until = slot->until[buffer], .version = latest >> 2, .what = (uint16_t)(index + 1u), .aborting = false};
     atomic_store_explicit(&slot->reading, 0u, memory_order_release);
-    box->version = latest >> 2;
-    box->what = (uint16_t)(index + 1u);
-    box->aborting = false;
     return true;
 }
 
-/** Hands a message to a mailbox, or drops it when it is too late. @return as load(); 1 when dropped. */
-static int send_command(canopy_tx_t *self, uint8_t mailbox, canopy_can_frame_t *frame, const canopy_tx_mailbox_t *box,
-                        canopy_time_t now)
+/**
+ * Hands a message to a mailbox, or drops it when it is too late.
+ * @param frame with its data and its time
+ * @return 1 it is out, in the mailbox, or dropped; else as send() of the driver, and 0 too when it has come back at once
+ */
+static int send_command(canopy_tx_t *self, uint8_t mailbox, canopy_can_frame_t *frame, const canopy_tx_mailbox_t *box)
 {
+    const canopy_can_t *can = self->can;
     const canopy_tx_message_t *message = &self->messages[box->what - 1u];
+    canopy_tx_slot_t *slot = &self->slots[box->what - 1u];
+    int result;
 
-    if (canopy_time_reached(now, box->until)) {
+    if (canopy_time_reached(frame->time, box->until)) {
         add(&self->expired, 1u);
-        take(self, box);
+        take(self, slot, box->version);
         return 1;
     }
-    frame->time = now;
     frame->id = message->id;
     frame->flags = message->flags;
     frame->length = message->length;
     if (message->data_id != CANOPY_E2E_NONE) {
-        canopy_e2e_protect((uint16_t)message->data_id, self->slots[box->what - 1u].counter, frame->data, frame->length);
+        canopy_e2e_protect((uint16_t)message->data_id, slot->counter, frame->data, frame->length);
     }
-    return load(self, mailbox, frame, box);
+    result = can->send(can->context, mailbox, frame);
+    if (result != 1) {
+        watch(self, box->until);
+        return result;
+    }
+    take(self, slot, box->version);
+    if (can->outcome != NULL) {
+        return fly(self, mailbox, *box, frame->time);
+    }
+    note_command_out(self, slot, box->version);
+    return 1;
 }
 
 /** @return 1 no message waits that could be sent, 0 one finds no room, negative: the driver cannot send now. */
 static int send_commands(canopy_tx_t *self, canopy_time_t now)
 {
-    for (uint16_t index = next_message(self, 0); index < self->count; index = next_message(self, index + 1u)) {
-        uint8_t mailbox = find_mailbox(self, index + 1u, now);
-        canopy_tx_mailbox_t box;
-        canopy_can_frame_t frame;
+    canopy_can_frame_t frame;
 
+    frame.time = now;
+    for (uint16_t index = 0; index < self->count; index++) {
+        canopy_tx_mailbox_t box;
+        uint8_t mailbox;
+
+        if (!waits(&self->slots[index])) {
+            continue;
+        }
+        mailbox = find_mailbox(self, index + 1u, now);
         if (mailbox == (uint8_t)NO_MAILBOX) {
             return 0;
         }
-        if (copy(self, index, &frame, &box)) { /* else the loop asks for another service when it has written */
-            int result = send_command(self, mailbox, &frame, &box, now);
+        if (copy(self, index, frame.data, &box)) {
+            int result = send_command(self, mailbox, &frame, &box);
 
             if (result != 1) {
                 return result;
@@ -286,17 +303,25 @@ static void copy_trace_data(uint8_t *to, canopy_tx_trace_data_t from)
     to[7] = from.byte[7];
 }
 
-static int send_trace(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_trace_t *trace, canopy_time_t now)
+/** Hands a trace frame to a mailbox. @param frame with its time and its length @return as send_command() */
+static int send_trace(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_trace_t *trace, canopy_can_frame_t *frame)
 {
-    const canopy_tx_mailbox_t box = {.until = trace->until, .what = CANOPY_TX_TRACE};
-    canopy_can_frame_t frame;
+    const canopy_can_t *can = self->can;
+    int result;
 
-    frame.time = now;
-    frame.id = trace->id;
-    frame.flags = trace->flags;
-    frame.length = CANOPY_TX_TRACE_LENGTH;
-    copy_trace_data(frame.data, trace->data);
-    return load(self, mailbox, &frame, &box);
+    frame->id = trace->id;
+    frame->flags = trace->flags;
+    copy_trace_data(frame->data, trace->data);
+    result = can->send(can->context, mailbox, frame);
+    if (result != 1) {
+        watch(self, trace->until);
+        return result;
+    }
+    if (can->outcome != NULL) {
+        return fly(self, mailbox, (canopy_tx_mailbox_t){.until = trace->until, .what = CANOPY_TX_TRACE}, frame->time);
+    }
+    note_trace_out(self);
+    return 1;
 }
 
 /**
@@ -309,7 +334,10 @@ static int send_traces(canopy_tx_t *self, canopy_time_t now)
     const uint32_t head = atomic_load_explicit(&self->trace_head, memory_order_acquire);
     uint32_t tail = atomic_load_explicit(&self->trace_tail, memory_order_relaxed);
     uint8_t mailbox = tail != head ? find_mailbox(self, CANOPY_TX_TRACE, now) : (uint8_t)NO_MAILBOX;
+    canopy_can_frame_t frame;
 
+    frame.time = now;
+    frame.length = CANOPY_TX_TRACE_LENGTH;
     for (; tail != head && !self->trace_flying; tail++) {
         const canopy_tx_trace_t *trace = &self->trace[tail & self->trace_mask];
 
@@ -317,7 +345,7 @@ static int send_traces(canopy_tx_t *self, canopy_time_t now)
             forget_trace(self);
             add(&self->trace_late, 1u);
         } else {
-            int result = mailbox != (uint8_t)NO_MAILBOX ? send_trace(self, mailbox, trace, now) : 0;
+            int result = mailbox != (uint8_t)NO_MAILBOX ? send_trace(self, mailbox, trace, &frame) : 0;
 
             if (result != 1) {
                 return result;
@@ -327,19 +355,32 @@ static int send_traces(canopy_tx_t *self, canopy_time_t now)
     return 1;
 }
 
+/** Drops what waits, unless its oldest frame is in a mailbox: then it has to stay where it is. */
+static void drop_traces(canopy_tx_t *self)
+{
+    const uint32_t head = atomic_load_explicit(&self->trace_head, memory_order_acquire);
+
+    if (!self->trace_flying) {
+        add(&self->trace_late, head - atomic_load_explicit(&self->trace_tail, memory_order_relaxed));
+        atomic_store_explicit(&self->trace_tail, head, memory_order_release);
+    }
+}
+
 void canopy_tx_service(canopy_tx_t *self, canopy_time_t now)
 {
-    bool busy;
     int result;
 
-    collect(self, now);
+    if (self->in_flight != 0u) {
+        collect(self, now);
+    }
+    if (self->watching && canopy_time_reached(now, self->watched_until)) {
+        atomic_store_explicit(&self->blocked, true, memory_order_relaxed);
+    }
     result = send_commands(self, now);
-    if (result == 1) {
+    if (trace_is_stopped(self)) {
+        drop_traces(self);
+    } else if (result == 1) {
         result = send_traces(self, now);
     }
-    busy = result == 0;
-    for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
-        busy = busy || self->mailboxes[mailbox].what != 0u;
-    }
-    atomic_store_explicit(&self->busy, busy, memory_order_relaxed);
+    atomic_store_explicit(&self->busy, result == 0 || self->in_flight != 0u, memory_order_relaxed);
 }

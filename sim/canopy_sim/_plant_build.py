@@ -1,44 +1,40 @@
 # SPDX-License-Identifier: MIT
 """Builds the extension `canopy_sim._plant` from the plant's C sources (run by setuptools, see setup.py).
 
-API mode: the C compiler checks every declaration below against the headers, so they cannot drift apart unseen.
+API mode: cffi reads the declarations in the headers themselves, without comments and directives, and the C compiler
+checks them once more, so they cannot drift apart.
 """
+
+import re
+from pathlib import Path
 
 from cffi import FFI
 
+PLANT = Path(__file__).resolve().parent.parent / "plant"
+HEADERS = ("power", "posture", "nao", "figures", "robot")  # in the order in which they need each other
+CONSTANTS = ("CANOPY_SIM_POWER_STEP_MS", "CANOPY_SIM_POSTURE_STEP_MS")
+
+
+def declarations(header: str) -> str:
+    """What a header declares, as cffi takes it."""
+    text = (PLANT / "include" / "canopy_sim" / f"{header}.h").read_text(encoding="utf-8")
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    text = text.replace("\\\n", "")
+    return re.sub(r"^#.*$", "", text, flags=re.MULTILINE)
+
+
 ffibuilder = FFI()
-
-ffibuilder.cdef(
-    """
-    typedef enum {
-        CANOPY_SIM_POWER_STOP, CANOPY_SIM_POWER_DO_TASK, CANOPY_SIM_POWER_DRIVE_TO_CHARGER, CANOPY_SIM_POWER_CHARGE
-    } canopy_sim_power_mode_t;
-    typedef struct { int64_t distance_nm; int32_t battery; bool charging; } canopy_sim_power_t;
-    bool canopy_sim_power_set(canopy_sim_power_t *power, int64_t distance_nm, int32_t battery);
-    void canopy_sim_power_step(canopy_sim_power_t *power, canopy_sim_power_mode_t mode);
-    int32_t canopy_sim_power_distance_mm(const canopy_sim_power_t *power);
-
-    typedef enum {
-        CANOPY_SIM_POSTURE_STOP, CANOPY_SIM_POSTURE_SIT_UP, CANOPY_SIM_POSTURE_STAND_UP, CANOPY_SIM_POSTURE_WALK_HOME
-    } canopy_sim_posture_mode_t;
-    typedef struct { int32_t head_x_mm; int32_t head_height_mm; } canopy_sim_posture_t;
-    bool canopy_sim_posture_set(canopy_sim_posture_t *posture, int32_t head_x_mm, int32_t head_height_mm);
-    void canopy_sim_posture_step(canopy_sim_posture_t *posture, canopy_sim_posture_mode_t mode);
-    void canopy_sim_posture_push_over(canopy_sim_posture_t *posture);
-
-    #define CANOPY_SIM_POWER_STEP_MS ...
-    #define CANOPY_SIM_POSTURE_STEP_MS ...
-    typedef struct { canopy_sim_power_t power; canopy_sim_posture_t posture; } canopy_sim_nao_t;
-    void canopy_sim_nao_init(canopy_sim_nao_t *nao);
-    """
-)
+for header in HEADERS:
+    ffibuilder.cdef(declarations(header))
+for constant in CONSTANTS:
+    ffibuilder.cdef(f"#define {constant} ...")
 
 # setuptools wants paths relative to setup.py.
 ffibuilder.set_source(
     "canopy_sim._plant",
-    '#include "canopy_sim/nao.h"',
-    sources=["plant/src/nao.c", "plant/src/posture.c", "plant/src/power.c"],
-    include_dirs=["plant/include"],
+    '#include "canopy_sim/robot.h"',
+    sources=[f"plant/src/{path.name}" for path in sorted((PLANT / "src").glob("*.c"))],
+    include_dirs=["plant/include", "plant/src"],
     extra_compile_args=["-std=c11"],
 )
 

@@ -15,18 +15,20 @@ import click
 from canopy.can_bus.steady import SteadyBus
 from canopy.canbus import CanBusError, split_spec
 from canopy.compiler.cli import HexNumber
+from canopy.compiler.errors import CompileError
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
 from canopy.process.say import Voice
+from canopy_sim.deeds import OF_WHOLE
 from canopy_sim.lcm_side import open_lcm_side
 from canopy_sim.messages import DEFAULT_TRACE, DescriptionError, RobotMessages, load_messages
-from canopy_sim.plant import Plant
-from canopy_sim.process import BusGoneError, Simulation
+from canopy_sim.plant import Plant, Profile
+from canopy_sim.process import FASTEST, BusGoneError, Simulation
 from canopy_sim.robot import Robot
 from canopy_sim.summary import summarise, summary_text
+from canopy_sim.timetable import Event, load_timetable
 
-FASTEST = 1000
 LARGEST = 10**9
 """Steps in one number of a Pair: what is below fits into the plant's integers, which then look closer."""
 
@@ -78,15 +80,27 @@ def read_dbc(path: Path, trace: int) -> RobotMessages:
         raise click.BadParameter(str(error), param_hint="'--dbc'") from error
 
 
-def make_plant(power: tuple[int, int], posture: tuple[int, int]) -> Plant:
-    """The plant in its first state: (distance [mm], battery [0.1 %]), (head x, head height [mm])."""
-    plant = Plant()
+def read_timetable(_ctx: click.Context, _param: click.Parameter, value: Path | None) -> list[Event]:
+    """Reads the mission while the command line is read."""
     try:
-        plant.set_power(power[0] * 10**6, power[1])
+        return [] if value is None else load_timetable(value)
+    except CompileError as error:
+        raise click.BadParameter(str(error)) from error
+
+
+def make_plant(
+    power: tuple[int, int] | None, posture: tuple[int, int] | None, profile: Profile = Profile.paper, seed: int = 1
+) -> Plant:
+    """The plant as it begins: (distance [mm], battery [0.1 %]), (head x, head height [mm]); None: the profile's."""
+    plant = Plant(profile, seed)
+    try:
+        if power is not None:
+            plant.set_power(power[0] * 10**6, power[1])
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'--power'") from error
     try:
-        plant.set_posture(*posture)
+        if posture is not None:
+            plant.set_posture(*posture)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'--posture'") from error
     return plant
@@ -99,6 +113,8 @@ def make_plant(power: tuple[int, int], posture: tuple[int, int]) -> Plant:
 Examples:
   A controller in real time, the robot's clock 10 times as fast:
     canopy-sim --can unixbus:bus0 --dbc nao.dbc --time-factor 10
+  The whole robot, and what people do to it in a minute and a half:
+    canopy-sim --can unixbus:bus0 --dbc big.dbc --profile nao --mission missions/tour.toml
   Exactly 2000 steps, one for each tick of a controller that was started with --lock-step:
     canopy-sim --can socketcan:vcan0 --dbc nao.dbc --lock-step --steps 2000 --json
 """,
@@ -110,7 +126,7 @@ Examples:
     "--dbc",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     required=True,
-    help="The bus description, examples/nao/nao.dbc.",
+    help="The bus description: examples/nao/nao.dbc for Examples 4 and 5, big.dbc for the whole robot.",
 )
 @click.option(
     "--trace",
@@ -129,18 +145,33 @@ Examples:
 @click.option(
     "--power",
     type=Pair(1000, 10),
-    default="80,50",
-    show_default=True,
-    help="First distance to the charger [m] and charge [%].",
+    help="First distance to the charger [m] and charge [%].  [default: paper 80,50, nao 3,80]",
 )
 @click.option(
     "--posture",
     type=Pair(1000, 1000),
-    default="0.5,0",
-    show_default=True,
-    help="First distance of the head from home and height of the head [m].",
+    help="First distance of the head from home and height of the head [m].  [default: paper 0.5,0, nao 0.5,0.55]",
 )
-@click.option("--steps", type=click.IntRange(1), help="End after so many steps of the plant (1 s of the robot's time).")
+@click.option(
+    "--profile",
+    type=click.Choice([profile.name for profile in Profile]),
+    default=Profile.paper.name,
+    show_default=True,
+    help="The paper's equations, or a NAO's documented figures (needs big.dbc).",
+)
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True, help="Of the robot's chances.")
+@click.option(
+    "--steps",
+    type=click.IntRange(1),
+    help="End after so many steps of the plant (1 s of the robot's time, with nao 10 ms).",
+)
+@click.option(
+    "--mission",
+    "timetable",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    callback=read_timetable,
+    help="What happens to the robot and when: timed events in TOML.",
+)
 @click.option("--lcm-url", default=DEFAULT_URL, show_default=True, help="Where the state goes and commands come from.")
 @click.option("--no-lcm", is_flag=True, help="Without LCM.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one line of JSON.")
@@ -150,18 +181,20 @@ def main(
     trace: int,
     lock_step: bool,
     time_factor: float | None,
-    power: tuple[int, int],
-    posture: tuple[int, int],
+    power: tuple[int, int] | None,
+    posture: tuple[int, int] | None,
+    profile: str,
+    seed: int,
     steps: int | None,
+    timetable: list[Event],
     lcm_url: str,
     no_lcm: bool,
     as_json: bool,
 ) -> None:
-    """The robot's stand-in: battery and posture of a NAO on a CAN bus.
+    """Robot simulator: a NAO on a CAN bus.
 
-    Sends the sensor frames Battery and Posture, obeys PowerCommand and PostureCommand, and stops when they are older
-    than their timeout. The state goes out on LCM, and commands come in (set the state, push the robot over, stop
-    sending).
+    Sends the robot's sensor frames, obeys its command frames, and stops when they are older than their timeout. State,
+    events and health go out on LCM, and commands come in: `canopy sim --help` lists them.
     Without --steps it runs until Ctrl-C. A summary is printed at the end.
 
     Exit status: 0 done, 1 the bus cannot be opened or has failed, 2 wrong command line or DBC.
@@ -169,21 +202,32 @@ def main(
     if lock_step and time_factor is not None:
         raise click.UsageError("--time-factor is for real time: in lock-step the controller's ticks are the clock.")
     messages = read_dbc(dbc, trace)
-    robot = Robot(messages, make_plant(power, posture))
+    if profile == Profile.nao.name and not messages.is_whole:
+        raise click.UsageError("--profile nao is for the whole robot: give --dbc examples/nao/big.dbc.")
+    _check_timetable(timetable, messages)
+    robot = Robot(messages, make_plant(power, posture, Profile[profile], seed))
     try:
         bus = SteadyBus(bus_name, Voice("canopy-sim"), create=True)
     except CanBusError as error:
         echo(f"canopy-sim: {error}", err=True)
         sys.exit(1)
     with bus:
-        lcm_side = None if no_lcm else open_lcm_side(lcm_url, robot.execute)
-        simulation = Simulation(bus, messages, robot, lcm_side, steps)
+        simulation = Simulation(bus, messages, robot, steps=steps, timetable=timetable)
+        simulation.lcm_side = None if no_lcm else open_lcm_side(lcm_url, simulation.execute)
         mode = "lock-step" if lock_step else "real time"
         echo(f"canopy-sim: {mode} on {bus_name}", err=True)
         ended_by = _run(simulation, lock_step, time_factor or 1.0)
         summary = summarise(simulation, mode, ended_by)
     echo_lines(dumps(summary) if as_json else summary_text(summary))
     sys.exit(1 if ended_by == "failure" else 0)
+
+
+def _check_timetable(timetable: list[Event], messages: RobotMessages) -> None:
+    for _, deed in timetable:
+        if deed.kind in OF_WHOLE and not messages.is_whole:
+            raise click.UsageError(
+                f"--mission has {deed.kind.name}, which is for the whole robot: give --dbc examples/nao/big.dbc."
+            )
 
 
 def _run(simulation: Simulation, lock_step: bool, time_factor: float) -> str:

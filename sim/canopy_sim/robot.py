@@ -2,53 +2,34 @@
 """The robot: commands in, freshness, steps of the plant, sensors out. Knows neither the bus nor the clock.
 
 A command is obeyed from the frame that brought it until its message's timeout has passed; then, and before the first
-one, the robot acts on the safe value (Stop). Times are seconds of any monotonic clock, handed in.
+one, the robot acts on the safe values (Stop). Times are seconds of any monotonic clock, handed in.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
-from fractions import Fraction
 
 import can
 
-from canopy_sim.messages import REFUSALS, CommandMessage, FrameRefusedError, RobotMessages
-from canopy_sim.plant import POSTURE_STEP_MS, POWER_STEP_MS, Plant, PostureMode, PowerMode
+from canopy_sim.deeds import Deed, Kind, do
+from canopy_sim.events import Event, Watcher
+from canopy_sim.frames import REFUSALS, CommandMessage, FrameRefusedError
+from canopy_sim.messages import RobotMessages
+from canopy_sim.plant import POSTURE_STEP_MS, POWER_STEP_MS, Command, Plant, PostureMode, PowerMode
 
 POWER_EVERY = POWER_STEP_MS // POSTURE_STEP_MS
 """Steps of the posture part in one step of the power part, in the robot's time."""
 
-
-LARGEST_VALUE = 1e6
-"""No quantity of a DeskCommand comes near it; what is below fits into the plant's integers, which then look closer."""
-
-
-class CommandKind(IntEnum):
-    """What a person at a desk can do to the robot; the numbers are those of robot_command_t."""
-
-    SET_STATE = 0
-    PUSH_OVER = 1
-    STOP_SENDING = 2
-    RESUME_SENDING = 3
-
-
-@dataclass(frozen=True)
-class DeskCommand:
-    """One robot_command_t. Values: battery [%], the others [m]; NaN: leave as it is."""
-
-    kind: CommandKind
-    battery: float = math.nan
-    charger_distance: float = math.nan
-    head_x: float = math.nan
-    head_height: float = math.nan
+PHASES_MAX = 10_000
+"""Of those the last ones are kept: a run of days must not fill the memory."""
 
 
 @dataclass(frozen=True)
 class RobotState:
-    """What the robot shows to people: battery [%], lengths [m]."""
+    """What the robot shows to people: battery [%], lengths [m]. More of it is in robot_state_t."""
 
     step: int
     battery: float
@@ -67,19 +48,19 @@ class _Command:
 
     def __init__(self, message: CommandMessage) -> None:
         self._message = message
-        self._accepted = message.safe_mode
+        self._accepted = message.safe
         self._deadline = math.inf
         self._new = False
         self.valid = False
         self.timeouts = 0
 
     @property
-    def mode(self) -> int:
+    def values(self) -> dict[str, int]:
         """What is to be done now."""
-        return self._accepted if self.valid else self._message.safe_mode
+        return self._accepted if self.valid else self._message.safe
 
-    def accept(self, mode: int, now: float) -> None:
-        self._accepted = mode
+    def accept(self, values: dict[str, int], now: float) -> None:
+        self._accepted = values
         self._deadline = math.inf if self._message.timeout is None else now + self._message.timeout
         self._new = self.valid = True
 
@@ -98,20 +79,32 @@ class _Command:
 
 
 class Robot:
-    """One NAO on the bus. Counters only grow."""
+    """One NAO on the bus: a small one (Examples 4 and 5) or a whole one, as the DBC has it. Counters only grow."""
 
     def __init__(self, messages: RobotMessages, plant: Plant) -> None:
         self._messages = messages
-        self._plant = plant
+        self.plant = plant
         self._power = _Command(messages.power_command)
         self._posture = _Command(messages.posture_command)
+        self._upper = None if messages.upper_command is None else _Command(messages.upper_command)
+        self._commands = [self._power, self._posture, *([] if self._upper is None else [self._upper])]
+        self._takers: dict[int, Callable[[can.Message, float], None]] = {
+            one.arbitration_id: self._taker(one, command)
+            for one, command in (
+                (messages.power_command, self._power),
+                (messages.posture_command, self._posture),
+                (messages.upper_command, self._upper),
+            )
+            if one is not None and command is not None
+        }
+        self.watcher = Watcher(plant)
         self.sending = True
         """Sensor frames are to be sent."""
         self.steps = 0
         self.minimum_battery = plant.battery
         """Least charge seen [0.1 %]."""
         self.phases: list[tuple[str, str, int]] = []
-        """Modes of both parts, and for how many steps in a row."""
+        """Modes of power and legs, and for how many steps in a row; the last PHASES_MAX."""
         self.accepted = 0
         self.refused: Counter[str] = Counter(dict.fromkeys(REFUSALS, 0))
         self.ignored = 0
@@ -119,6 +112,25 @@ class Robot:
         self.unknown = 0
         """Frames with other ids."""
         self.error_frames = 0
+
+    @staticmethod
+    def _taker(message: CommandMessage, command: _Command) -> Callable[[can.Message, float], None]:
+        return lambda frame, now: command.accept(message.unpack(frame), now)
+
+    @property
+    def is_whole(self) -> bool:
+        """Not only Examples 4 and 5."""
+        return self._messages.is_whole
+
+    @property
+    def step_ms(self) -> int:
+        """Length of a step in the robot's time [ms]."""
+        return self.plant.step_ms if self.is_whole else POSTURE_STEP_MS
+
+    @property
+    def time_ms(self) -> int:
+        """The robot's clock [ms]; of a small robot that of its posture part."""
+        return int(self.plant.raw.time_ms) if self.is_whole else self.steps * POSTURE_STEP_MS
 
     def receive(self, frame: can.Message, now: float) -> bool:
         """Takes one frame from the bus; whatever is wrong with it changes a counter only.
@@ -136,127 +148,115 @@ class Robot:
             return False
 
     def _obey(self, frame: can.Message, now: float) -> bool:
-        messages = self._messages
-        if frame.arbitration_id == messages.power_command.arbitration_id:
-            self._power.accept(messages.power_command.unpack(frame)["Mode"], now)
-        elif frame.arbitration_id == messages.posture_command.arbitration_id:
-            self._posture.accept(messages.posture_command.unpack(frame)["Mode"], now)
-        elif frame.arbitration_id == messages.tick.arbitration_id:
-            messages.tick.check(frame)
+        is_tick = False
+        taker = self._takers.get(frame.arbitration_id)
+        if taker is not None:
+            taker(frame, now)
+        elif frame.arbitration_id == self._messages.tick.arbitration_id:
+            self._messages.tick.check(frame)
+            is_tick = True
         else:
-            known = frame.arbitration_id in messages.known_ids
+            known = frame.arbitration_id in self._messages.known_ids
             self.ignored += known
             self.unknown += not known
             return False
         self.accepted += 1
-        return frame.arbitration_id == messages.tick.arbitration_id
+        return is_tick
 
     def expire(self, now: float) -> None:
         """Lets commands go whose timeout has passed."""
-        self._power.expire(now)
-        self._posture.expire(now)
+        for command in self._commands:
+            command.expire(now)
 
     def lock_step(self, now: float) -> None:
-        """One step of both parts, with the commands that came since the last one."""
-        self._power.begin_lock_step(now)
-        self._posture.begin_lock_step(now)
+        """One step with the commands that came since the last one; of a small robot, one of each part."""
+        for command in self._commands:
+            command.begin_lock_step(now)
         self._step(with_power=True)
 
     def real_time_step(self, now: float) -> None:
-        """One step of the posture part, and one of the power part every POWER_EVERY."""
+        """One step; of a small robot's power part, one every POWER_EVERY."""
         self.expire(now)
         self._step(with_power=(self.steps + 1) % POWER_EVERY == 0)
 
+    @property
+    def command(self) -> Command:
+        """What the robot acts on now."""
+        upper = {} if self._upper is None else self._upper.values
+        return Command(
+            power=self._power.values["Mode"],
+            legs=self._posture.values["Mode"],
+            arms=upper.get("Arms", 0),
+            say=upper.get("Say", 0),
+            arms_number=upper.get("ArmsNumber", 0),
+            say_number=upper.get("SayNumber", 0),
+            track_ball=upper.get("TrackBall", 0),
+        )
+
     def _step(self, with_power: bool) -> None:
-        power, posture = PowerMode(self._power.mode), PostureMode(self._posture.mode)
-        if with_power:
-            self._plant.step_power(power)
-        self._plant.step_posture(posture)
+        command = self.command
+        if self.is_whole:
+            self.plant.step(command)
+        else:
+            if with_power:
+                self.plant.step_power(command.power)
+            self.plant.step_posture(command.legs)
         self.steps += 1
-        self.minimum_battery = min(self.minimum_battery, self._plant.battery)
+        self.minimum_battery = min(self.minimum_battery, self.plant.battery)
+        self._note_phase(PowerMode(command.power).name, PostureMode(command.legs).name)
+        if self.is_whole:
+            self.watcher.look(command)
+
+    def _note_phase(self, power: str, legs: str) -> None:
         count = 1
-        if self.phases and self.phases[-1][:2] == (power.name, posture.name):
+        if self.phases and self.phases[-1][:2] == (power, legs):
             count += self.phases.pop()[2]
-        self.phases.append((power.name, posture.name, count))
+        elif len(self.phases) >= PHASES_MAX:
+            del self.phases[0]
+        self.phases.append((power, legs, count))
 
-    def battery_frame(self) -> can.Message:
-        """The next frame of Battery."""
-        return self._messages.battery.frame(
-            {
-                "Charging": int(self._plant.charging),
-                "Level": Fraction(self._plant.battery, 10),
-                "ChargerDistance": Fraction(self._plant.distance_mm, 1000),
-            }
-        )
+    def frame(self, message: str) -> can.Message:
+        """The next frame of one of the sensors."""
+        sensor, outgoing = self._messages.sensors[message]
+        return outgoing.frame(sensor.show(self.plant))
 
-    def posture_frame(self) -> can.Message:
-        """The next frame of Posture."""
-        return self._messages.posture.frame(
-            {
-                "HeadX": Fraction(self._plant.head_x_mm, 1000),
-                "HeadHeight": Fraction(self._plant.head_height_mm, 1000),
-            }
-        )
-
-    def execute(self, command: DeskCommand) -> None:
+    def execute(self, deed: Deed) -> None:
         """Does what a person at a desk wants.
 
         Raises:
-            ValueError: A value is out of range; nothing was changed.
+            ValueError: A value is out of range, or this robot has no such part; nothing was changed.
         """
-        if command.kind is CommandKind.SET_STATE:
-            self._set_state(command)
-        elif command.kind is CommandKind.PUSH_OVER:
-            self._plant.push_over()
-        else:
-            self.sending = command.kind is CommandKind.RESUME_SENDING
+        if deed.kind in (Kind.STOP_SENDING, Kind.RESUME_SENDING):
+            self.sending = deed.kind is Kind.RESUME_SENDING
+            return
+        do(self.plant, deed, is_whole=self.is_whole)
+        if deed.kind is Kind.RESET:
+            self.minimum_battery = self.plant.battery
+            self.phases.clear()
+        self.minimum_battery = min(self.minimum_battery, self.plant.battery)
 
-    def _set_state(self, command: DeskCommand) -> None:
-        plant = self._plant
-        distance = _units(command.charger_distance, 1e9, plant.distance_nm)
-        battery = _units(command.battery, 10, plant.battery)
-        head_x = _units(command.head_x, 1e3, plant.head_x_mm)
-        head_height = _units(command.head_height, 1e3, plant.head_height_mm)
-        before = plant.head_x_mm, plant.head_height_mm
-        plant.set_posture(head_x, head_height)
-        if (distance, battery) != (plant.distance_nm, plant.battery):
-            try:
-                plant.set_power(distance, battery)
-            except ValueError:
-                plant.set_posture(*before)
-                raise
-        self.minimum_battery = min(self.minimum_battery, plant.battery)
+    def events(self) -> list[Event]:
+        """What has happened since the last call, in words."""
+        return self.watcher.take()
 
     @property
     def timeouts(self) -> int:
         """How often a command has become too old."""
-        return self._power.timeouts + self._posture.timeouts
+        return sum(command.timeouts for command in self._commands)
 
     @property
     def state(self) -> RobotState:
         """The state now."""
+        command = self.command
         return RobotState(
             step=self.steps,
-            battery=self._plant.battery / 10,
-            charger_distance=self._plant.distance_nm / 1e9,
-            head_x=self._plant.head_x_mm / 1e3,
-            head_height=self._plant.head_height_mm / 1e3,
-            charging=self._plant.charging,
-            power_mode=PowerMode(self._power.mode),
-            posture_mode=PostureMode(self._posture.mode),
-            stopped=not (self._power.valid or self._posture.valid),
+            battery=self.plant.battery / 10,
+            charger_distance=self.plant.distance_nm / 1e9,
+            head_x=self.plant.head_x_mm / 1e3,
+            head_height=self.plant.head_height_mm / 1e3,
+            charging=self.plant.charging,
+            power_mode=PowerMode(command.power),
+            posture_mode=PostureMode(command.legs),
+            stopped=not any(command.valid for command in self._commands),
             sending=self.sending,
         )
-
-
-def _units(value: float, per_unit: float, otherwise: int) -> int:
-    """A number in the plant's units, to the nearest; NaN gives `otherwise`.
-
-    Raises:
-        ValueError: The number is infinite, or too large for the plant's integers.
-    """
-    if math.isnan(value):
-        return otherwise
-    if abs(value) > LARGEST_VALUE:
-        raise ValueError(f"{value} is out of range")
-    return round(value * per_unit)

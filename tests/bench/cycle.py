@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Counts the instructions of whole cycles of the examples, on this machine and on Cortex-M4."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from . import build, cortex_m, image, instructions
 EXAMPLES = build.REPOSITORY / "examples"
 CYCLES = 100
 WHOLE = "canopy_loop_step"
+INTERRUPT = "bench_cycle_interrupt"
 # What of a cycle is counted by itself: the functions' instructions, with all that they call.
 PARTS = {
     "receive": ("canopy_bus_receive",),
@@ -38,6 +39,13 @@ class Application:
     options: tuple[str, ...] = ()
     warm_up: int = 0
     """Cycles before those that are counted."""
+    mailboxes: int = 0
+    """Of the controller; 0: what it is given is out at once."""
+
+    @property
+    def title(self) -> str:
+        """Its name in the tables."""
+        return f"{self.name} with {self.mailboxes} mailboxes" if self.mailboxes else self.name
 
 
 _E2E = {"E2E_CRC": 0, "E2E_Counter": 0}
@@ -55,8 +63,9 @@ _COURIER_TYPES = {
     "geometry_msgs::msg::PoseStamped_<std::allocator<void>>": "pose_t",
     "nav_msgs::msg::Path_<std::allocator<void>>": "path_t",
 }
+_NAO_POWER = Application("nao_power", EXAMPLES / "nao", "power_supply.xml", "nao.dbc", ("power_leaves.c",), _NAO)
 APPLICATIONS = (
-    Application("nao_power", EXAMPLES / "nao", "power_supply.xml", "nao.dbc", ("power_leaves.c",), _NAO),
+    _NAO_POWER,
     Application("nao_home", EXAMPLES / "nao", "get_home.xml", "nao.dbc", ("home_leaves.c",), _NAO),
     Application(
         "courier",
@@ -70,6 +79,7 @@ APPLICATIONS = (
             *(word for cpp, c in _COURIER_TYPES.items() for word in ("--type-map", f"{cpp}={c}")),
         ),
     ),
+    replace(_NAO_POWER, mailboxes=3),
 )
 
 
@@ -132,7 +142,8 @@ def generate(application: Application, folder: Path) -> Path:
 
 def _sources(application: Application, generated: Path) -> tuple[str | Path, ...]:
     return (
-        *(f"-DBENCH_APP={application.name}_app", f"-I{generated}", f"-I{application.folder}"),
+        *(f"-DBENCH_APP={application.name}_app", f"-DBENCH_MAILBOXES={application.mailboxes}"),
+        *(f"-I{generated}", f"-I{application.folder}"),
         *sorted(generated.glob("*.c")),
         *(application.folder / leaves for leaves in application.leaves),
         *sorted((build.REPOSITORY / "runtime/src").glob("*.c")),
@@ -142,28 +153,33 @@ def _sources(application: Application, generated: Path) -> tuple[str | Path, ...
 
 def host_program(target: build.Target, application: Application, generated: Path, folder: Path) -> Path:
     """The application and its bus for this machine: bench_cycle CYCLES."""
-    path = folder / f"cycle_{application.name}_{target.name}"
+    path = folder / f"cycle_{application.name}_{application.mailboxes}_{target.name}"
     sources = _sources(application, generated)
     build.run(*target.command, *build.COMMON, *sources, build.HERE / "cycle_main.c", "-o", path)
     return path
 
 
 def measure_host(program: Path, warm_up: int = 0) -> dict[str, float]:
-    """Part -> its instructions per cycle, and "whole". Raises RuntimeError when a frame was lost or rejected."""
+    """Part -> its instructions per cycle, and "whole" and "interrupts", which come on top of the whole.
+
+    Raises RuntimeError when a frame was lost or rejected.
+    """
 
     def counted(cycles: int, functions: tuple[str, ...]) -> int:
         return instructions.collected((program, str(cycles)), within=functions)[0] if cycles else 0
 
-    parts = {"whole": (WHOLE,), **PARTS}
-    return {
+    parts = {"whole": (WHOLE,), **PARTS, "interrupts": (INTERRUPT,)}
+    counts = {
         part: round((counted(warm_up + CYCLES, functions) - counted(warm_up, functions)) / CYCLES, 1)
         for part, functions in parts.items()
     }
+    counts["transmit"] = round(counts["transmit"] - counts["interrupts"], 1)  # what is called within both
+    return counts
 
 
 def bare_program(target: build.Target, application: Application, generated: Path, folder: Path) -> Path:
     """The same for a Cortex-M core, as build.link_bare()."""
-    path = folder / f"cycle_{application.name}_{target.name.replace(' ', '_')}.elf"
+    path = folder / f"cycle_{application.name}_{application.mailboxes}_{target.name.replace(' ', '_')}.elf"
     return build.link_bare(target, path, *_sources(application, generated))
 
 
@@ -173,7 +189,7 @@ def measure_cortex(program: Path, warm_up: int = 0) -> dict[str, float]:
     if core.call("bench_cycle_start") != 0:
         raise RuntimeError(f"{program.name}: canopy_loop_init() rejects the application")
     parts = {function: part for part, functions in PARTS.items() for function in functions}
-    totals = dict.fromkeys(("whole", *PARTS), 0)
+    totals = dict.fromkeys(("whole", *PARTS, "interrupts"), 0)
     worst = 0
     for number in range(warm_up + CYCLES):
         core.call("bench_cycle_prepare")
@@ -183,6 +199,10 @@ def measure_cortex(program: Path, warm_up: int = 0) -> dict[str, float]:
         worst = max(worst, counts["whole"])
         for part, count in counts.items():
             totals[part] += count
+        while core.call("bench_cycle_let_out") != 0:
+            counts = core.count_parts(INTERRUPT, parts)
+            totals["interrupts"] += counts["whole"]
+            totals["e2e"] += counts["e2e"]
     failures = core.call("bench_cycle_failures")
     if failures != 0:
         raise RuntimeError(f"{program.name}: {failures} frames were lost or rejected, or faults counted")

@@ -16,6 +16,9 @@ int main(int count, char **arguments)
     for (unsigned long cycle = 0; cycle < cycles; cycle++) {
         bench_cycle_prepare();
         (void)canopy_loop_step(&bench_loop);
+        while (bench_cycle_let_out()) {
+            bench_cycle_interrupt();
+        }
     }
     (void)printf("{\"ticks\": %lu, \"failures\": %lu}\n", (unsigned long)bench_loop.ticks,
                  (unsigned long)bench_cycle_failures());

@@ -118,7 +118,7 @@ def _cycles(folder: Path, say: Progress) -> dict[str, Any]:
     results: dict[str, Any] = {}
     for application in (*cycle.APPLICATIONS, cycle.idle(folder / "idle_tree")):
         generated = cycle.generate(application, folder)
-        columns = results[application.name] = {}
+        columns = results[application.title] = {}
         for target in build.HOSTS:
             say(f"{target.name}: cycles of {application.name}")
             columns[target.name] = cycle.measure_host(

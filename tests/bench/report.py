@@ -26,9 +26,11 @@ CYCLE = {
     "trace": "- trace",
     "transmit": "- transmit",
     "rest": "- loop, clock, driver",
+    "interrupts": "transmit interrupts, on top",
     "e2e": "- E2E in check and transmit",
     "worst": "longest of them",
 }
+WITHOUT_SHARE = ("whole", "interrupts", "worst")
 PARTS_OF_WHOLE = ("receive", "begin", "tick", "commit", "trace", "transmit")
 CYCLE_TARGETS = {
     "nao_power": {"cortex-m4 -O2": {"whole": 2300}},
@@ -100,12 +102,12 @@ def _stack(results: dict[str, Any]) -> str:
 def _cycle_cell(name: str, target: str, counts: dict[str, float], part: str) -> str:
     if part == "rest":
         value = counts["whole"] - sum(counts[named] for named in PARTS_OF_WHOLE)
-    elif part in counts:
+    elif part in counts and (counts[part] or part != "interrupts"):
         value = counts[part]
     else:
         return ""
     most = CYCLE_TARGETS.get(name, {}).get(target, {}).get(part)
-    share = f" ({value / counts['whole']:.0%})" if part not in ("whole", "worst") else ""
+    share = f" ({value / counts['whole']:.0%})" if part not in WITHOUT_SHARE else ""
     return f"{value:,.0f}" + share + (f" (to reach: {most:,})" if most is not None else "")
 
 
@@ -116,7 +118,8 @@ def _cycles(applications: dict[str, Any], machine: str) -> str:
         columns = [target if " " in target else f"{machine}, {target} -O2" for target in targets]
         for part, what in CYCLE.items():
             cells = [_cycle_cell(name, target, counts, part) for target, counts in targets.items()]
-            rows.append([f"{name}: {what}" if part in ("whole", "worst") else what, *cells])
+            if any(cells):
+                rows.append([f"{name}: {what}" if part in WITHOUT_SHARE else what, *cells])
     return _table(["instructions per cycle", *columns], rows)
 
 

@@ -35,10 +35,14 @@ static const scenario_t scenarios[] = {
     {.name = "backlog", .options = {.rx_max = 2, .peer_period = 47 * NS_PER_MS}},
     {.name = "loaded",
      .options = {.mailboxes = 1, .cannot_abort = true, .traffic = {.per_mille = 850, .burst = 40, .highest_id = 0xFF}}},
-    {.name = "overloaded",
+    {.name = "bursts", /* of 32 ms */
      .options = {.mailboxes = 1,
                  .cannot_abort = true,
                  .traffic = {.per_mille = 900, .burst = 120, .highest_id = 0xFF}}},
+    {.name = "overloaded",
+     .options = {.mailboxes = 1,
+                 .cannot_abort = true,
+                 .traffic = {.per_mille = 985, .burst = 120, .highest_id = 0xFF}}},
     {.name = "replaced", .fault = CABLE_OUT, .first_ms = 390, .length_ms = 70, .pause_ms = 430},
     {.name = "one_mailbox",
      .options = {.mailboxes = 1},
@@ -53,6 +57,7 @@ static const scenario_t scenarios[] = {
      .length_ms = 70,
      .pause_ms = 430},
     {.name = "socket", .options = {.queue = 10}, .fault = CABLE_OUT, .first_ms = 390, .length_ms = 70, .pause_ms = 430},
+    {.name = "blocked", .fault = CABLE_OUT, .first_ms = 390, .length_ms = 200, .pause_ms = 800}, /* for four ticks */
     {.name = "bus_off", .fault = CANNOT_DRIVE, .first_ms = 499, .length_ms = 10, .pause_ms = 1990},
     {.name = "long_block", .fault = CABLE_OUT, .first_ms = 5000, .length_ms = 1000, .pause_ms = 5000},
 };

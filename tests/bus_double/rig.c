@@ -87,12 +87,13 @@ static void make_driver(rig_t *self, const rig_options_t *options)
 void rig_init(rig_t *self, const rig_options_t *options)
 {
     traffic_config_t traffic = options->traffic;
+    const uint32_t bit_rate = options->bit_rate != 0u ? options->bit_rate : RIG_BIT_RATE;
 
     *self = (rig_t){.end = NEVER};
     world_init(&self->world);
     self->world.now = NS_PER_S; /* not 0: a time of 0 is an ordinary time, but in no test's expectation */
-    wire_init(&self->wire, &self->world, RIG_BIT_RATE);
-    wire_init(&self->nowhere, &self->world, RIG_BIT_RATE);
+    wire_init(&self->wire, &self->world, bit_rate);
+    wire_init(&self->nowhere, &self->world, bit_rate);
     wire_set_watch(&self->wire, watch, self);
     self->clock = (canopy_clock_t){.context = self, .now = now, .wait_until = wait_until};
     self->config = (canopy_loop_config_t){.context = self,

@@ -14,12 +14,13 @@
 #include "traffic.h"
 #include "wire.h"
 
-#define RIG_BIT_RATE 500000u
-#define RIG_SEED 20261130u /**< Of the others' traffic, if the options have none. */
+#define RIG_BIT_RATE 500000u /**< If the options have none. */
+#define RIG_SEED 20261130u   /**< Of the others' traffic, if the options have none. */
 
 /** What a rig is made of. All zero: one common controller with an interrupt, abort and filters; nobody else on the bus. */
 typedef struct {
     const canopy_app_t *app;
+    uint32_t bit_rate; /**< [bit/s] 0: RIG_BIT_RATE. */
     uint8_t mailboxes; /**< 0: those of `controller`. */
     bool polled;       /**< No interrupts. */
     bool cannot_abort;
@@ -55,7 +56,7 @@ typedef struct rig {
     nanoseconds_t end;        /* the loop is told to stop then */
     nanoseconds_t stopped_at; /* when canopy_loop_run() came back */
     uint32_t from_controller;
-    rig_fault_t faults[8];                                                            /* by canopy_fault_t */
+    rig_fault_t faults[CANOPY_FAULT_TX_REPLACED + 1];                                 /* by canopy_fault_t */
     void (*saw)(struct rig *rig, const canopy_can_frame_t *frame, nanoseconds_t end); /* a frame of the application */
     void (*after)(struct rig *rig);                                                   /* a cycle */
 } rig_t;

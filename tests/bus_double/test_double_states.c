@@ -93,8 +93,13 @@ static void check_safe_first(void)
         TEST_ASSERT_TRUE_MESSAGE(driving_at > first_at[command], "another value left before all safe ones");
         TEST_ASSERT_EQUAL_UINT32(0, rig.peer.commands[command].refused);
     }
-    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, last_state);
     TEST_ASSERT_FALSE(rig.loop.returning);
+}
+
+static void check_safe_first_and_well_again(void)
+{
+    check_safe_first();
+    TEST_ASSERT_EQUAL(CANOPY_CAN_ERROR_ACTIVE, last_state);
 }
 
 /* --- many errors ---------------------------------------------------------------------------------------------------- */
@@ -150,7 +155,7 @@ static void check_bus_off(nanoseconds_t length)
            (first_at[COMMANDS - 1] - mended_at) / NS_PER_MS, (driving_at - mended_at) / NS_PER_MS);
     TEST_ASSERT_GREATER_THAN_UINT32(0, ticks_in[CANOPY_CAN_BUS_OFF]);
     TEST_ASSERT_EQUAL_UINT32(0, ticks_in[CANOPY_CAN_BLOCKED]);
-    check_safe_first();
+    check_safe_first_and_well_again();
     TEST_ASSERT_GREATER_THAN_UINT32(1, attempt_count);
     for (uint32_t index = 1; index < attempt_count; index++) { /* each pause is twice the one before */
         pause = 2u * pause < CANOPY_CAN_RESTART_LONGEST_US * NS_PER_US ? 2u * pause
@@ -174,6 +179,50 @@ static void test_a_long_bus_off_does_not_disturb_others(void)
     TEST_ASSERT_EQUAL(CANOPY_OK, run(break_transmitter, mend_transmitter, 20u * NS_PER_S));
     check_bus_off(20u * NS_PER_S);
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(12, rig.controller->bus_offs); /* 50, 100, ... 5,000 ms: not hundreds */
+}
+
+/**
+ * On a bus on which a tick's commands do not all get out in one tick, the way back takes more ticks, and ends.
+ * @param frames how many of ours get out in a tick, about
+ */
+static void check_slow_return(const rig_options_t *options, const char *what)
+{
+    uint64_t ticks;
+
+    start(options);
+    (void)run(break_transmitter, mend_transmitter, NS_PER_S);
+    TEST_ASSERT_NOT_EQUAL_UINT64_MESSAGE(0, first_at[COMMANDS - 1], "a safe value was never sent");
+    ticks = (first_at[COMMANDS - 1] - first_at[0]) / (PERIOD_MS * NS_PER_MS);
+    printf("%s: all safe values within %" PRIu64 " ms, driving %" PRIu64 " ms after the first of them\n", what,
+           (first_at[COMMANDS - 1] - first_at[0]) / NS_PER_MS, (driving_at - first_at[0]) / NS_PER_MS);
+    TEST_ASSERT_GREATER_THAN_UINT64_MESSAGE(0, ticks, "they all left in one tick: this tests nothing");
+    TEST_ASSERT_GREATER_THAN_UINT32(0, ticks_in[CANOPY_CAN_BUS_OFF]);
+    check_safe_first();
+}
+
+static void test_a_slow_bus_gives_control_back(void)
+{
+    for (uint8_t mailboxes = 1; mailboxes <= 3u; mailboxes += 2u) {
+        check_slow_return(
+            &(rig_options_t){
+                .app = &six_app, .mailboxes = mailboxes, .bit_rate = 50000, .peer_period = 20u * NS_PER_MS},
+            "50 kbit/s, some 3 commands a tick");
+        check_slow_return(
+            &(rig_options_t){
+                .app = &six_app, .mailboxes = mailboxes, .bit_rate = 10000, .peer_period = 40u * NS_PER_MS},
+            "10 kbit/s, less than one command a tick");
+    }
+}
+
+static void test_a_loaded_bus_gives_control_back(void)
+{
+    for (uint8_t mailboxes = 1; mailboxes <= 3u; mailboxes += 2u) {
+        check_slow_return(
+            &(rig_options_t){.app = &six_app,
+                             .mailboxes = mailboxes,
+                             .traffic = {.per_mille = 930, .burst = 10, .lowest_id = 0x001, .highest_id = 0x0FF}},
+            "93 % by others");
+    }
 }
 
 static void test_a_controller_that_forgets_at_bus_off(void)
@@ -239,7 +288,7 @@ static void test_a_short_circuit_while_sending_is_bus_off(void)
     rig.loop.deadline -= 200; /* the ticks are that much earlier than the fault */
     TEST_ASSERT_EQUAL(CANOPY_OK, run(hold, let_go, NS_PER_S));
     TEST_ASSERT_GREATER_THAN_UINT32(90, ticks_in[CANOPY_CAN_BUS_OFF]);
-    check_safe_first();
+    check_safe_first_and_well_again();
 }
 
 /* --- an interface ---------------------------------------------------------------------------------------------------- */
@@ -275,7 +324,7 @@ static void check_interface(canopy_can_state_t told, bool has_echo)
     }
     TEST_ASSERT_EQUAL_UINT32((uint32_t)CANOPY_CAN_ERROR_ACTIVE, rig.faults[CANOPY_FAULT_CAN_STATE].last_detail);
     TEST_ASSERT_EQUAL_UINT32(2, rig.faults[CANOPY_FAULT_CAN_STATE].count);
-    check_safe_first();
+    check_safe_first_and_well_again();
     TEST_ASSERT_TRUE(has_echo || driving_at > first_at[0]);
 }
 
@@ -306,6 +355,8 @@ int main(void)
     RUN_TEST(test_warning_and_passive_are_told);
     RUN_TEST(test_bus_off_backs_off_and_returns_with_safe_values);
     RUN_TEST(test_a_long_bus_off_does_not_disturb_others);
+    RUN_TEST(test_a_slow_bus_gives_control_back);
+    RUN_TEST(test_a_loaded_bus_gives_control_back);
     RUN_TEST(test_a_controller_that_forgets_at_bus_off);
     RUN_TEST(test_bus_off_polled);
     RUN_TEST(test_bus_off_like_socketcan);

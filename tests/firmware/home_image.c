@@ -35,7 +35,7 @@ static void print_tick(unsigned tick, const canopy_sim_posture_t *before)
     print_metres(": x1 ", before->head_x_mm);
     print_metres(", x2 ", before->head_height_mm);
     semihosting_put(", ");
-    semihosting_put(mode_names[run.posture_mode]);
+    semihosting_put(mode_names[run.nao.posture_mode]);
     semihosting_put("\n");
 }
 
@@ -45,21 +45,22 @@ int main(void)
     canopy_status_t root = CANOPY_RUNNING;
     int failures = 0;
 
-    if (nao_in_process_init(&run, &nao_home_app) != CANOPY_OK || !canopy_sim_posture_set(&run.robot.posture, 500, 0)) {
+    if (nao_in_process_init(&run, &nao_home_app) != CANOPY_OK ||
+        !canopy_sim_posture_set(&run.nao.robot.posture, 500, 0)) {
         semihosting_put("The set-up failed.\n");
         return 1;
     }
     for (unsigned tick = 1; root == CANOPY_RUNNING && tick <= TICKS_MAX; tick++) {
-        canopy_sim_posture_t before = run.robot.posture;
+        canopy_sim_posture_t before = run.nao.robot.posture;
 
         root = nao_in_process_tick(&run);
-        steps[run.posture_mode] += root == CANOPY_RUNNING ? 1u : 0u;
+        steps[run.nao.posture_mode] += root == CANOPY_RUNNING ? 1u : 0u;
         print_tick(tick, &before);
     }
     for (unsigned mode = 0; mode < MODES; mode++) {
         failures += steps[mode] == expected_steps[mode] ? 0 : 1;
     }
-    failures += root == CANOPY_SUCCESS && run.robot.posture.head_x_mm == 0 ? 0 : 1;
+    failures += root == CANOPY_SUCCESS && run.nao.robot.posture.head_x_mm == 0 ? 0 : 1;
     semihosting_put(failures == 0 ? "home\n" : "not home, or not in the paper's number of steps\n");
     return failures;
 }

@@ -31,9 +31,9 @@ TICK = bytes([0, 0x20, 0, 0, 0, 0, 0, 1])
 class Simulator(OwnedProcess):
     """The process canopy-sim; ends with the context."""
 
-    def __init__(self, bus: str, *options: str, enter: list[str] | None = None) -> None:
+    def __init__(self, bus: str, *options: str, enter: list[str] | None = None, dbc: Path = DBC) -> None:
         """`enter` goes before the command line, e.g. to start it in another network."""
-        command = [sys.executable, "-m", "canopy_sim", "--can", bus, "--dbc", str(DBC), "--json", *options]
+        command = [sys.executable, "-m", "canopy_sim", "--can", bus, "--dbc", str(dbc), "--json", *options]
         self.process = subprocess.Popen(
             [*(enter or []), *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

@@ -52,6 +52,28 @@ def test_the_static_object_is_as_large_as_the_budget_says(tmp_path: Path, name: 
     assert int(memory[1]) - USER_STATE.get(name, 0) == pytest.approx(int(budget[1]), abs=7)
 
 
+def test_room_for_the_trace_is_stated_in_ticks(tmp_path: Path) -> None:
+    tree, dbc, period = APPLICATIONS["nao_home"]
+    arguments = ["compile", str(ROOT / tree), "--name", "nao_home", "--dbc", str(ROOT / dbc), "--node", "Controller"]
+    arguments += ["--period-ms", str(period), "-o", str(tmp_path)]
+    printed = CliRunner().invoke(main, arguments).output
+    assert re.search(r"^  trace +768 bytes of the RAM, room for 4 ticks without a bus$", printed, re.MULTILINE)
+    sizes = {}
+    for ticks in (1, 2, 4, 20, 21):
+        options = [*arguments, "--json", "--trace", "0x600", "--trace-ticks", str(ticks)]
+        budget = json.loads(CliRunner().invoke(main, options).output)
+        assert f".trace_ticks = {ticks}u," in (tmp_path / "nao_home_app.c").read_text(encoding="utf-8")
+        model = json.loads((tmp_path / "nao_home.model.json").read_text(encoding="utf-8"))
+        assert model["trace"]["ticks"] == ticks
+        sizes[ticks] = budget["trace_ram_bytes"]
+    rings = {ticks: size - sizes[1] for ticks, size in sizes.items()}
+    # 12 frames in a full tick and four in each other one, each of 24 bytes; a power of two of them.
+    assert rings == {1: 0, 2: 0, 4: 16 * 24, 20: 112 * 24, 21: 112 * 24}
+    refused = CliRunner().invoke(main, [*arguments, "--trace", "0x600", "--trace-ticks", "0"])
+    assert refused.exit_code == 2
+    assert "--trace-ticks" in refused.output
+
+
 def test_each_kind_of_node_has_a_price(tmp_path: Path) -> None:
     tree, dbc, period = APPLICATIONS["features"]
     arguments = ["compile", str(ROOT / tree), "--name", "features", "--dbc", str(ROOT / dbc), "--node", "Controller"]

@@ -40,6 +40,8 @@ MODEL = """\
     <Action ID="Drive"><MetadataFields><Metadata writes="PowerCommand"/></MetadataFields></Action>
     <Action ID="Charge"><MetadataFields><Metadata writes="PowerCommand.Mode"/></MetadataFields></Action>
     <Action ID="Stand"><MetadataFields><Metadata writes="PostureCommand"/></MetadataFields></Action>
+    <Action ID="Find"><output_port name="place" type="int"/></Action>
+    <Action ID="GoTo"><input_port name="place" type="int"/></Action>
     <Action ID="Walk"><input_port name="speed" type="int" default="3"/></Action>"""
 
 TREE = """\
@@ -154,12 +156,23 @@ CASES = [
      "<Repeat num_cycles='{cycles}'><Ready/></Repeat>"),
     ("unreachable-child", "<Repeat num_cycles='0'><Go/></Repeat>", "its parent never ticks its child",
      "<Repeat num_cycles='{cycles}'><Go/></Repeat>"),
-    ("hidden-failure", "<ForceSuccess><Go/></ForceSuccess>", "hides that <Go> can fail",
-     "<ForceSuccess><Stop/></ForceSuccess>"),
-    ("hidden-failure", "<Fallback><Go/><AlwaysSuccess/></Fallback>", "all other children",
+    ("hidden-failure", "<ForceSuccess><KeepPower/></ForceSuccess>", "which keeps 'Battery.Level' safe, has failed",
+     "<ForceSuccess><Go/></ForceSuccess>"),
+    ("hidden-failure",
+     "<Sequence><ForceSuccess><Find place='{p}'/></ForceSuccess><GoTo place='{p}'/></Sequence>",
+     "hides that <Find> can fail: <GoTo> reads 'p', which <Find> may not have written",
+     "<ForceSuccess><Sequence><Find place='{p}'/><GoTo place='{p}'/></Sequence></ForceSuccess>"),
+    ("hidden-failure", "<Fallback><KeepPower/><AlwaysSuccess/></Fallback>", "all other children",
+     "<Fallback><Go/><AlwaysSuccess/></Fallback>"),
+    ("root-can-fail", "<Fallback><Go/><Speak/></Fallback>", "its last resort, <Speak>, can fail",
      "<Fallback><Go/><Stop/></Fallback>"),
-    ("root-can-fail", "<Fallback><Go/><Speak/></Fallback>", "'Main' can return FAILURE",
-     "<Fallback><Go/><Stop/></Fallback>"),
+    ("root-can-fail", "<Inverter><Inverter><ReactiveFallback><Ready/><Go/></ReactiveFallback></Inverter></Inverter>",
+     "'Main' can return FAILURE", "<Sequence><Ready/><Go/></Sequence>"),
+    ("several-running", "<ReactiveSequence><Go/><Delay delay_msec='5'><Blink/></Delay></ReactiveSequence>",
+     "can be RUNNING", "<ReactiveSequence><Go/><Gone/></ReactiveSequence>"),
+    ("undeclared-node", "<Sequence><Gone/><Gone/></Sequence>", "no file declares 'Gone'", "<Sequence><Go/></Sequence>"),
+    ("refused-name", "<Go/></BehaviorTree><BehaviorTree ID='A B'><Go/>", "refuse the name 'A B'",
+     "<Go name='a.b/c d'/></BehaviorTree><BehaviorTree ID='A-B'><Go/>"),
     ("unused-tree", "<Go/></BehaviorTree><BehaviorTree ID='Spare'><Go/>",
      "tree 'Spare' is no part of the main tree 'Main'",
      "<SubTree ID='Spare'/></BehaviorTree><BehaviorTree ID='Spare'><Go/>"),
@@ -209,17 +222,18 @@ def test_a_tree_of_every_construct_with_the_compilers_options_about_types() -> N
 
 def test_trees_that_are_not_used_are_checked_too(tmp_path: Path) -> None:
     spare = (
-        "<Go/></BehaviorTree>\n<BehaviorTree ID='Inner'><ForceSuccess><Go/></ForceSuccess></BehaviorTree>"
+        "<Go/></BehaviorTree>\n<BehaviorTree ID='Inner'><ForceSuccess><KeepPower/></ForceSuccess></BehaviorTree>"
         "\n<BehaviorTree ID='Spare'><Sequence><SubTree ID='Inner'/><Walk/></Sequence></BehaviorTree>"
         "\n<BehaviorTree ID='Draft'><Gp/>"
     )
     result = run(write(tmp_path, spare), "--disable", "root-can-fail", "-q")
+    hidden = "<ForceSuccess> hides that <KeepPower> can fail: <KeepPower>, which keeps 'Battery.Level' safe, has failed"
     assert [line.split(":", 1)[1] for line in result.output.splitlines()[:-1]] == [
         "4:1: note: tree 'Inner' is no part of the main tree 'Main' [unused-tree]",
-        "4:26: warning: <ForceSuccess> hides that <Go> can fail [hidden-failure]",
+        f"4:26: warning: {hidden} [hidden-failure]",
         "5:1: note: tree 'Spare' is no part of the main tree 'Main' [unused-tree]",
         "6:1: note: tree 'Draft' is no part of the main tree 'Main' [unused-tree]",
-        "6:26: note: tree 'Draft' is not used, and would not compile: unknown node 'Gp' [unused-tree]",
+        "6:26: note: no file declares 'Gp' [undeclared-node]",
     ]
     assert run(write(tmp_path, spare), "--disable", "unused-tree", "-q").output.count("hidden-failure") == 0
 
@@ -258,10 +272,11 @@ def test_a_condition_that_writes_is_found_although_the_compiler_refuses_it(tmp_p
 
 def test_a_leaf_with_stale_signals_can_return_what_it_declares_for_that(tmp_path: Path) -> None:
     model = "<Action ID='Ready'><MetadataFields><Metadata reads='Battery' returns='RUNNING'/></MetadataFields></Action>"
-    found = check(write(tmp_path, "<Ready/>", model), all_rules().values()).findings
+    tree = "<Fallback><AlwaysFailure/><Ready/></Fallback>"
+    found = check(write(tmp_path, tree, model), all_rules().values()).findings
     assert [finding.rule.id for finding in found] == ["root-can-fail"]
     model = model.replace("returns", "stale='SUCCESS' returns")
-    assert check(write(tmp_path, "<Ready/>", model), all_rules().values()).findings == []
+    assert check(write(tmp_path, tree, model), all_rules().values()).findings == []
 
 
 def test_exit_statuses(tmp_path: Path) -> None:
@@ -269,9 +284,9 @@ def test_exit_statuses(tmp_path: Path) -> None:
     warning = "<Fallback><Stop/><Go/></Fallback>"
     assert run(write(tmp_path, warning)).exit_code == 0
     assert run(write(tmp_path, warning), "--strict").exit_code == 1
-    assert run(write(tmp_path, "<Go/>"), "--strict").exit_code == 0  # a note
+    assert run(write(tmp_path, "<Gone/>"), "--strict").exit_code == 0  # a note
     assert run(write(tmp_path, "<Parallel><Drive/><Drive/></Parallel>")).exit_code == 1
-    assert run(write(tmp_path, "<Gone/>")).exit_code == 2
+    assert run(write(tmp_path, "<Timeout><Go/></Timeout>")).exit_code == 2
     assert run(tmp_path / "none.xml").exit_code == 2
 
 
@@ -283,7 +298,7 @@ def test_an_unreadable_file_does_not_hide_the_others(tmp_path: Path) -> None:
 
 
 def test_severity_and_disable_leave_rules_out(tmp_path: Path) -> None:
-    file = write(tmp_path, "<ForceSuccess><Parallel><Drive/><Charge/><Go/></Parallel></ForceSuccess>")
+    file = write(tmp_path, "<ForceSuccess><Parallel><Drive/><Charge/><KeepPower/></Parallel></ForceSuccess>")
     assert run(file, "-q").output.splitlines()[-1] == "1 error, 1 warning"
     assert run(file, "-q", "--severity", "error").output.splitlines()[-1] == "1 error"
     assert run(file, "-q", "--disable", "parallel-write").output.splitlines()[-1] == "1 warning"
@@ -303,7 +318,7 @@ def test_names_of_signals_are_checked_against_the_bus(tmp_path: Path) -> None:
 
 def test_a_node_can_allow_a_rule(tmp_path: Path) -> None:
     allow = '_description="Only polite. canopy:allow hidden-failure, unused-port: nobody waits for it"'
-    result = run(write(tmp_path, f"<ForceSuccess {allow}><Go/></ForceSuccess>"))
+    result = run(write(tmp_path, f"<ForceSuccess {allow}><KeepPower/></ForceSuccess>"))
     assert result.output == "nothing found (1 allowed)\n"
     result = run(write(tmp_path, "<ForceSuccess _description='canopy:allow hiden-failure'><Go/></ForceSuccess>"))
     assert result.exit_code == 2
@@ -347,7 +362,7 @@ def test_json(tmp_path: Path) -> None:
 
 
 def test_sarif_has_the_structure_of_2_1_0(tmp_path: Path) -> None:
-    file = write(tmp_path, "<Parallel><Drive/><Charge name='Ω'/><ForceSuccess><Go/></ForceSuccess></Parallel>")
+    file = write(tmp_path, "<Parallel><Drive/><Charge name='Ω'/><ForceSuccess><KeepPower/></ForceSuccess></Parallel>")
     log = json.loads(run(file, "--sarif").output)
     assert set(log) == {"$schema", "version", "runs"}
     assert log["version"] == "2.1.0"
@@ -364,7 +379,7 @@ def test_sarif_has_the_structure_of_2_1_0(tmp_path: Path) -> None:
         assert rule["defaultConfiguration"]["level"] in levels
     ids = [rule["id"] for rule in driver["rules"]]
     assert ids == list(all_rules())
-    assert len(sarif_run["results"]) == 3
+    assert len(sarif_run["results"]) == 2
     for result in sarif_run["results"]:
         assert set(result) == {"ruleId", "ruleIndex", "level", "message", "locations"}
         assert ids[result["ruleIndex"]] == result["ruleId"]

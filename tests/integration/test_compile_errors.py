@@ -68,7 +68,7 @@ def expect_error(tmp_path: Path, result: Result, place: str, *texts: str) -> Non
         ("<Go speed='fast'/>", "main.xml:3:16", ["'fast' is not a whole number"]),
         ("<Go speed='{x}'/>", "main.xml:3:16", ["port 'speed' of 'Go': nothing writes entry 'x'"]),
         ("<Go sped='3'/>", "main.xml:3:5", ["has no attribute 'sped'", "did you mean 'speed'?"]),
-        ("<Ready _skpIf='true'/>", "main.xml:3:5", ["has no attribute '_skpIf'", "did you mean '_skipIf'?"]),
+        ("<Ready _skpIf='true'/>", "main.xml:3:20", ["has no attribute '_skpIf'", "did you mean '_skipIf'?"]),
         ("<SubTree ID='Main'/>", "main.xml:3:5", ["trees contain each other in a cycle: Main -> Main"]),
         ("<Action ID='Ready'/>", "main.xml:3:5", ["'Ready' is declared as Condition"]),
     ],

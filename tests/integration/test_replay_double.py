@@ -48,13 +48,10 @@ def replay(build_dir: Path) -> Callable[..., Result]:
     return replay_it
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("calm", "fifos", "backlog", "loaded", "replaced", "one_mailbox", "no_abort", "socket"),
-        *("overloaded", "bus_off"),
-    ],
-)
+BLOCKED = ["replaced", "one_mailbox", "no_abort", "socket", "blocked"]
+
+
+@pytest.mark.parametrize("name", ["calm", "fifos", "backlog", "loaded", "bursts", "overloaded", "bus_off", *BLOCKED])
 def test_a_run_is_equal(
     run: Callable[[str], tuple[Path, dict[str, int]]], replay: Callable[..., Result], name: str
 ) -> None:
@@ -76,7 +73,14 @@ def test_a_run_is_equal(
         assert told["oldest"] <= 11
     elif name in ("calm", "loaded"):
         assert data["dropped"] == data["uncounted"] == data["unheard"] == 0
-    elif name in ("overloaded", "bus_off"):
+    elif name == "bursts":
+        assert data["dropped"] > 100
+        assert told["oldest"] > 150
+    elif name == "bus_off":
+        assert told["bus-offs"] == 10
+        assert data["dropped"] >= 30
+        assert data["unheard"] > 30
+    elif name == "overloaded":
         assert data["dropped"] >= 40
     else:
         assert data["dropped"] >= 38

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import itertools
+import random
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -11,10 +13,12 @@ import pytest
 from click.testing import CliRunner
 
 from canopy.cli import main
+from canopy.compiler.errors import Place
 from canopy.compiler.node_types import node_types
 from canopy.compiler.port_types import ANY_TYPE
+from canopy.compiler.tree import Node
 from canopy.compiler.tree_reader import read_tree
-from canopy.show.layout import Box, place
+from canopy.show.layout import GAP_X, Box, place
 from canopy.show.order import in_order
 from canopy.show.symbols import look
 from canopy.show.terminal import lines
@@ -173,3 +177,95 @@ def test_a_tree_with_types_of_the_users_own() -> None:
     assert "[Measure]" in show(floating)
     wrong = CliRunner().invoke(main, ["show", str(floating), "--ros-package", "x"])
     assert (wrong.exit_code, "'x' is not NAME=DIR" in wrong.output) == (2, True)
+
+
+UNFINISHED = """\
+<root{format}>
+  <BehaviorTree ID="A"><SequenceStar foo="1">
+    <IsDoorOpen/><Timeout><OpenDoor speed="fast"/></Timeout><SubTree ID="Gone"/><SubTree ID="Part"/>
+    <Recovery><Go/><Go/></Recovery>
+  </SequenceStar></BehaviorTree>
+  <BehaviorTree ID="B"><Fly/></BehaviorTree>
+  <BehaviorTree ID="Part"><Script code="a <= b"/></BehaviorTree>
+  <TreeNodesModel><Action/></TreeNodesModel>
+</root>
+""".replace("<=", "&lt;=")
+
+
+@pytest.mark.parametrize("version", [' BTCPP_format="4"', ' BTCPP_format="3"', ' main_tree_to_execute="None"', ""])
+def test_what_does_not_compile_is_drawn_as_far_as_it_can_be(tmp_path: Path, version: str) -> None:
+    file = tmp_path / "wild.xml"
+    file.write_text(UNFINISHED.replace("{format}", version), encoding="utf-8")
+    result = CliRunner().invoke(main, ["show", str(file)])
+    assert result.exit_code == 0, result.output
+    assert result.stdout == (
+        "A\nSequenceStar\n├── (IsDoorOpen)\n├── δ Timeout\n│   └── [OpenDoor]\n├── [SubTree Gone]\n├── [Script]\n"
+        "└── Recovery\n    ├── [Go]\n    └── [Go]\nB\n[Fly]\n"
+    )
+    assert "would not compile" in result.stderr
+    one = CliRunner().invoke(main, ["show", str(file), "--main-tree", "B"])
+    assert one.stdout == "B\n[Fly]\n"
+    drawn = CliRunner().invoke(main, ["show", str(file), "--dot", "-"])
+    assert drawn.exit_code == 0 and "for another tree: --main-tree B" in drawn.stderr
+
+
+@pytest.mark.timeout(60)
+def test_a_chain_as_deep_as_the_compiler_takes_is_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "chain.xml"
+    levels = 30_000
+    inner = "<Inverter>" * levels + "<AlwaysSuccess/>" + "</Inverter>" * levels
+    file.write_text(f'<root BTCPP_format="4"><BehaviorTree ID="M">{inner}</BehaviorTree></root>')
+    result = CliRunner().invoke(main, ["show", str(file), "--svg", str(tmp_path / "chain.svg")])
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "chain.svg").read_text().count("<rect") == levels + 2
+    result = CliRunner().invoke(main, ["show", str(file)])
+    assert result.stdout.splitlines()[-1] == f"{levels} └── [AlwaysSuccess]"
+    assert max(map(len, result.stdout.splitlines())) < 300
+
+
+def test_outlines_are_as_close_as_they_come() -> None:
+    """Against a plain computation: each level's ends, moved and merged."""
+    rng = random.Random(20261130)
+    kind = node_types()["Sequence"]
+    for _ in range(40):
+        boxes = [Box(Node(kind, "n", Place("x")), rng.choice([20.0, 60.0, 100.0]), 20.0, 0)]
+        for _ in range(rng.randrange(30)):
+            above = rng.choice(boxes)
+            boxes.append(Box(Node(kind, "n", Place("x")), rng.choice([20.0, 60.0, 100.0]), 20.0, above.depth + 1))
+            above.children.append(boxes[-1])
+        order: list[Box] = []
+        waiting = [boxes[0]]
+        while waiting:
+            order.append(waiting.pop())
+            waiting.extend(reversed(order[-1].children))
+        place(order)
+        for level in range(max(box.depth for box in order) + 1):
+            row = sorted((box for box in order if box.depth == level), key=lambda box: box.x)
+            assert row == [box for box in order if box.depth == level]
+            for one, other in itertools.pairwise(row):
+                assert other.x - other.width / 2 - (one.x + one.width / 2) >= GAP_X - 1e-6
+        for box in order:
+            if box.children:
+                assert abs(box.x - (box.children[0].x + box.children[-1].x) / 2) < 1e-6
+            for child in box.children[1:]:  # it touches what stands left of it, somewhere
+                levels = range(child.depth, 1 + max(other.depth for other in order))
+                mine, left = _below(child), _left_of(box, child)
+                gaps = []
+                for level in levels:
+                    a = [o.x - o.width / 2 for o in mine if o.depth == level]
+                    b = [o.x + o.width / 2 for o in left if o.depth == level]
+                    gaps += [min(a) - max(b)] if a and b else []
+                assert min(gaps) == pytest.approx(GAP_X)
+
+
+def _below(box: Box) -> list[Box]:
+    found, waiting = [], [box]
+    while waiting:
+        found.append(waiting.pop())
+        waiting.extend(found[-1].children)
+    return found
+
+
+def _left_of(parent: Box, child: Box) -> list[Box]:
+    before = parent.children[: next(i for i, other in enumerate(parent.children) if other is child)]
+    return [box for sibling in before for box in _below(sibling)]

@@ -107,8 +107,8 @@ def test_without_the_jar_it_does_not(tmp_path: Path, lcm_jar: Path, messages: di
 def test_the_jar_holds_the_types_for_java_8_and_nothing_else(jar: Path) -> None:
     with zipfile.ZipFile(jar) as packed:
         files = sorted(name for name in packed.namelist() if not name.endswith("/"))
-        names = ("robot_command_t", "robot_state_t", "tree_status_t", "tree_structure_t")
-        assert files == [f"canopy_msgs/{name}.class" for name in names]
+        robot = [f"robot_{name}_t" for name in ("command", "event", "health", "state")]
+        assert files == [f"canopy_msgs/{name}.class" for name in (*robot, "tree_status_t", "tree_structure_t")]
         assert packed.read(files[0])[6:8] == b"\x00\x34"  # class file version 52
     assert sorted(path.name for path in jar.parent.iterdir()) == ["canopy_msgs.jar", "python", "python.stamp"]
 

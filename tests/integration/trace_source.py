@@ -117,6 +117,7 @@ def model_data(nodes: int) -> dict[str, Any]:
             "extended": False,
             "guard": None,
             "snapshot_every": 2,
+            "ticks": 4,
             "changes_max": 8,
             "values_max": 2,
             "values_every": 10,

@@ -508,6 +508,44 @@ static void the_check_folds_in_ages_and_the_state_of_the_bus(void)
     TEST_ASSERT_FALSE(rx_states[0].taken_then);
 }
 
+static void frames_find_their_message_in_any_order(void)
+{
+    static const char order[] = "sspspppus?pp?s";
+    uint8_t counter = 0;
+    uint8_t value = 0;
+
+    for (const char *next = order; *next != '\0'; next++) {
+        canopy_can_frame_t frame = speed_frame(counter, ++value % 100u);
+
+        if (*next == 'p') {
+            frame = (canopy_can_frame_t){.id = PLAIN_ID, .flags = CANOPY_CAN_EXTENDED, .length = 1, .data = {value}};
+        } else if (*next == 'u') {
+            frame.flags = CANOPY_CAN_ERROR;
+        } else if (*next == '?') {
+            frame.id = SPEED_ID + 1u;
+        } else {
+            counter++;
+        }
+        canopy_bus_receive(&bus, &frame, 0);
+        if (*next == 's' || *next == 'p') {
+            TEST_ASSERT_EQUAL_UINT8(value, *next == 's' ? input.speed : input.plain);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(11, bus.counters.accepted);
+    TEST_ASSERT_EQUAL_UINT32(3, bus.counters.unknown_id);
+}
+
+static void an_application_that_receives_nothing_knows_no_frame(void)
+{
+    static const canopy_bus_t nothing = {.reset_output = reset_output, .set_cycle = set_cycle};
+    canopy_can_frame_t frame = speed_frame(0, 1);
+
+    bus.bus = &nothing;
+    canopy_bus_receive(&bus, &frame, 0);
+    canopy_bus_receive(&bus, &frame, 0);
+    TEST_ASSERT_EQUAL_UINT32(2, bus.counters.unknown_id);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -534,5 +572,7 @@ int main(void)
     RUN_TEST(a_refused_frame_does_not_make_what_is_there_younger);
     RUN_TEST(leaves_see_the_state_of_the_bus);
     RUN_TEST(the_check_folds_in_ages_and_the_state_of_the_bus);
+    RUN_TEST(frames_find_their_message_in_any_order);
+    RUN_TEST(an_application_that_receives_nothing_knows_no_frame);
     return UNITY_END();
 }

@@ -27,16 +27,16 @@ static void from_lying_at_half_a_metre(void)
         unsigned ticks;
     } phases[] = {{CANOPY_SIM_POSTURE_SIT_UP, 10}, {CANOPY_SIM_POSTURE_STAND_UP, 4}, {CANOPY_SIM_POSTURE_WALK_HOME, 5}};
 
-    TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, 500, 0));
+    TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.nao.robot.posture, 500, 0));
     for (unsigned phase = 0; phase < 3u; phase++) {
         for (unsigned tick = 0; tick < phases[phase].ticks; tick++) {
             TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
-            TEST_ASSERT_EQUAL(phases[phase].mode, run.posture_mode);
+            TEST_ASSERT_EQUAL(phases[phase].mode, run.nao.posture_mode);
         }
     }
     TEST_ASSERT_EQUAL(CANOPY_SUCCESS, nao_in_process_tick(&run));
-    TEST_ASSERT_EQUAL(CANOPY_SIM_POSTURE_STOP, run.posture_mode);
-    TEST_ASSERT_EQUAL_INT32(0, run.robot.posture.head_x_mm);
+    TEST_ASSERT_EQUAL(CANOPY_SIM_POSTURE_STOP, run.nao.posture_mode);
+    TEST_ASSERT_EQUAL_INT32(0, run.nao.robot.posture.head_x_mm);
 }
 
 static void from_everywhere_within_the_papers_bound(void)
@@ -46,26 +46,26 @@ static void from_everywhere_within_the_papers_bound(void)
         for (int32_t x2 = 0; x2 <= 550; x2 += 11) {
             unsigned ticks = 1;
 
-            TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, x1, x2));
+            TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.nao.robot.posture, x1, x2));
             while (nao_in_process_tick(&run) == CANOPY_RUNNING) {
                 ticks++;
                 TEST_ASSERT_LESS_OR_EQUAL_UINT(TICKS_MAX, ticks);
             }
-            TEST_ASSERT_LESS_OR_EQUAL_INT32(0, run.robot.posture.head_x_mm);
-            TEST_ASSERT_GREATER_THAN_INT32(-WALKED_PER_TICK_MM, run.robot.posture.head_x_mm);
+            TEST_ASSERT_LESS_OR_EQUAL_INT32(0, run.nao.robot.posture.head_x_mm);
+            TEST_ASSERT_GREATER_THAN_INT32(-WALKED_PER_TICK_MM, run.nao.robot.posture.head_x_mm);
         }
     }
 }
 
 static void pushed_over_it_gets_up_again(void)
 {
-    TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.robot.posture, 500, 500));
+    TEST_ASSERT_TRUE(canopy_sim_posture_set(&run.nao.robot.posture, 500, 500));
     for (unsigned tick = 0; tick < 3u; tick++) {
         TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
     }
-    canopy_sim_posture_push_over(&run.robot.posture);
+    canopy_sim_posture_push_over(&run.nao.robot.posture);
     TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
-    TEST_ASSERT_EQUAL(CANOPY_SIM_POSTURE_SIT_UP, run.posture_mode);
+    TEST_ASSERT_EQUAL(CANOPY_SIM_POSTURE_SIT_UP, run.nao.posture_mode);
     for (unsigned tick = 1; tick < 10u + 4u + 2u; tick++) {
         TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
     }

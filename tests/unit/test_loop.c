@@ -99,7 +99,7 @@ static bool wait_until(void *context, canopy_time_t deadline)
 
 static const canopy_clock_t fake_clock = {.now = now, .wait_until = wait_until};
 static unsigned kicks;
-static unsigned faults[8];
+static unsigned faults[CANOPY_FAULT_TX_REPLACED + 1];
 
 static void kick(void *context)
 {

@@ -11,12 +11,12 @@
 #include "small_app.h"
 #include "unity.h"
 
-enum { FAULTS = 8 };
+enum { FAULTS = CANOPY_FAULT_TX_REPLACED + 1 };
 
 /* In the documents and in logs of the field. */
 _Static_assert(CANOPY_FAULT_LEAF_STATUS == 1 && CANOPY_FAULT_OVERRUN == 2 && CANOPY_FAULT_CAN_RECEIVE == 3 &&
                    CANOPY_FAULT_RX_BACKLOG == 4 && CANOPY_FAULT_RX_LOST == 5 && CANOPY_FAULT_CAN_STATE == 6 &&
-                   CANOPY_FAULT_TX_EXPIRED == 7,
+                   CANOPY_FAULT_TX_EXPIRED == 7 && CANOPY_FAULT_TX_REPLACED == 8,
                "numbers of faults are stable");
 
 static small_memory_t memory;
@@ -194,6 +194,21 @@ static void what_is_past_its_deadline_does_not_leave_while_the_next_tick_is_work
     cycle(0);
 }
 
+static void a_newer_value_before_the_deadline_is_another_fault(void)
+{
+    use_mailboxes();
+    cycle(0);
+    clock_now -= PERIOD_US / 2; /* the next cycle comes when the first one's commands have half of their time left */
+    cycle(0);
+    canopy_tx_service(&memory.tx, clock_now);
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_TX_REPLACED]);
+    TEST_ASSERT_EQUAL_UINT32(1, details[CANOPY_FAULT_TX_REPLACED]);
+    TEST_ASSERT_EQUAL_UINT32(1, loop.tx_replaced);
+    TEST_ASSERT_EQUAL_UINT(1, faults[CANOPY_FAULT_TX_EXPIRED]); /* the newer one, later */
+    TEST_ASSERT_EQUAL_UINT32(1, loop.tx_expired);
+}
+
 static void faults_may_go_unheard(void)
 {
     use_mailboxes();
@@ -244,6 +259,13 @@ static void after_an_unusable_bus_every_messages_safe_value_is_the_first_that_le
     TEST_ASSERT_FALSE(loop.returning);
 }
 
+/** One frame leaves, and what waits takes its place. */
+static void let_one_out(void)
+{
+    boxes_let_out(0);
+    canopy_tx_service(&memory.tx, clock_now);
+}
+
 static void safe_values_go_on_until_they_are_known_to_be_out(void)
 {
     use_mailboxes();
@@ -258,19 +280,113 @@ static void safe_values_go_on_until_they_are_known_to_be_out(void)
         TEST_ASSERT_TRUE(boxes.is_full[0]);
         TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.box[0].data[0]);
     }
-    boxes_let_out(0);
-    canopy_tx_service(&memory.tx, clock_now);
+    let_one_out();
     TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, boxes.box[0].id);
     cycle(0); /* one of two */
     TEST_ASSERT_TRUE(loop.returning);
-    boxes_let_out(0);
-    canopy_tx_service(&memory.tx, clock_now);
-    boxes_let_out(0);
-    canopy_tx_service(&memory.tx, clock_now);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, boxes.box[0].id);
+    let_one_out();
+    TEST_ASSERT_FALSE(boxes.is_full[0]); /* the first one waits for the others */
     cycle(0);
     TEST_ASSERT_FALSE(loop.returning);
     TEST_ASSERT_EQUAL_UINT8(WANTED, boxes.box[0].data[0]);
     TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.out[boxes.out_count - 1u].data[0]);
+}
+
+static void a_bus_that_takes_one_frame_in_a_tick_gives_control_back(void)
+{
+    use_mailboxes();
+    fake.controller = CANOPY_CAN_CONTROLLER_BUS_OFF;
+    can.state = fake_can_state;
+    can.context = &fake;
+    cycle(0);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    cycle(0);
+    boxes_let_out(0);
+    cycle(0); /* the first message has returned: the other one is not kept waiting for its next value */
+    TEST_ASSERT_TRUE(loop.returning);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID + 1, boxes.box[0].id);
+    TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.box[0].data[0]);
+    boxes_let_out(0);
+    cycle(0);
+    TEST_ASSERT_FALSE(loop.returning);
+    TEST_ASSERT_EQUAL_HEX32(TX_ID, boxes.box[0].id);
+    TEST_ASSERT_EQUAL_UINT8(WANTED, boxes.box[0].data[0]);
+}
+
+static void what_was_decided_before_does_not_count_when_it_leaves(void)
+{
+    use_mailboxes();
+    can.abort = NULL; /* as a kernel's queue: what it has taken leaves some time */
+    can.state = fake_can_state;
+    can.context = &fake;
+    cycle(0);
+    fake.controller = CANOPY_CAN_CONTROLLER_BUS_OFF;
+    cycle(0);
+    fake.controller = CANOPY_CAN_CONTROLLER_ACTIVE;
+    TEST_ASSERT_EQUAL_UINT8(WANTED, boxes.box[0].data[0]);
+    let_one_out();
+    TEST_ASSERT_TRUE(canopy_tx_owes(&memory.tx, 0));
+    cycle(0);
+    for (unsigned frame = 1; frame <= 3u; frame++) { /* the first message's safe value twice: one was waiting already */
+        TEST_ASSERT_TRUE(loop.returning);
+        TEST_ASSERT_EQUAL_UINT8(SAFE, boxes.box[0].data[0]);
+        TEST_ASSERT_EQUAL_HEX32(frame < 3u ? TX_ID : TX_ID + 1, boxes.box[0].id);
+        let_one_out();
+        cycle(0);
+    }
+    TEST_ASSERT_FALSE(loop.returning);
+    let_one_out(); /* the second message's other one */
+    TEST_ASSERT_EQUAL_UINT8(WANTED, boxes.box[0].data[0]);
+}
+
+static void recorded_returning(void *context, canopy_can_conditions_t *conditions)
+{
+    (void)context;
+    *conditions = (canopy_can_conditions_t){.returning = clock_now < 4u * (canopy_time_t)PERIOD_US};
+}
+
+static void a_replay_sends_every_safe_value_in_each_tick_in_which_it_returned(void)
+{
+    can.conditions = recorded_returning;
+    for (unsigned tick = 1; tick < 4u; tick++) {
+        fake.tx_count = 0;
+        cycle(0);
+        TEST_ASSERT_EQUAL_UINT(2, sent_with(SAFE)); /* those that were held back then are counted in the record */
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, loop.tx_replaced);
+    fake.tx_count = 0;
+    cycle(0);
+    TEST_ASSERT_EQUAL_UINT(1, sent_with(WANTED));
+}
+
+/** Trace frames lost after so many ticks on a bus that lets nothing through. */
+static uint32_t trace_lost_after(unsigned ticks)
+{
+    canopy_tx_counters_t counters;
+
+    boxes_reset();
+    app.trace = &trace;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));
+    for (unsigned tick = 0; tick < ticks; tick++) {
+        cycle(0);
+    }
+    canopy_tx_count(&memory.tx, &counters);
+    return counters.trace_dropped;
+}
+
+static void the_trace_waits_for_the_bus_as_long_as_it_has_room(void)
+{
+    static canopy_tx_trace_t places[128];
+
+    use_mailboxes();
+    app.tx_memory.trace = places;
+    app.tx_memory.trace_capacity = 128;
+    TEST_ASSERT_EQUAL_UINT32(0, trace_lost_after(CANOPY_TRACE_PERIODS));
+    TEST_ASSERT_EQUAL_UINT32(6, trace_lost_after(CANOPY_TRACE_PERIODS + 1u)); /* the whole first tick */
+    app.trace_ticks = 6;
+    TEST_ASSERT_EQUAL_UINT32(0, trace_lost_after(CANOPY_TRACE_PERIODS + 6u));
+    TEST_ASSERT_EQUAL_UINT32(6, trace_lost_after(CANOPY_TRACE_PERIODS + 7u));
 }
 
 int main(void)
@@ -283,8 +399,13 @@ int main(void)
     RUN_TEST(a_failed_controller_is_restarted);
     RUN_TEST(leaves_see_a_blocked_bus);
     RUN_TEST(what_is_past_its_deadline_does_not_leave_while_the_next_tick_is_worked_out);
+    RUN_TEST(a_newer_value_before_the_deadline_is_another_fault);
     RUN_TEST(faults_may_go_unheard);
     RUN_TEST(after_an_unusable_bus_every_messages_safe_value_is_the_first_that_leaves);
+    RUN_TEST(a_bus_that_takes_one_frame_in_a_tick_gives_control_back);
+    RUN_TEST(what_was_decided_before_does_not_count_when_it_leaves);
+    RUN_TEST(a_replay_sends_every_safe_value_in_each_tick_in_which_it_returned);
     RUN_TEST(safe_values_go_on_until_they_are_known_to_be_out);
+    RUN_TEST(the_trace_waits_for_the_bus_as_long_as_it_has_room);
     return UNITY_END();
 }

@@ -34,10 +34,10 @@ static void the_battery_never_runs_empty(void)
             int64_t nm = (int64_t)distance * 100 * CANOPY_SIM_NM_PER_M / LAST_DISTANCE;
             int32_t tenths = LOWEST + ((int32_t)charge * (FULL - LOWEST) / LAST_CHARGE);
 
-            TEST_ASSERT_TRUE(canopy_sim_power_set(&run.robot.power, nm, tenths));
+            TEST_ASSERT_TRUE(canopy_sim_power_set(&run.nao.robot.power, nm, tenths));
             for (unsigned tick = 0; tick < TICKS; tick++) {
                 TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
-                TEST_ASSERT_GREATER_THAN_INT32(0, run.robot.power.battery);
+                TEST_ASSERT_GREATER_THAN_INT32(0, run.nao.robot.power.battery);
             }
         }
     }
@@ -47,12 +47,12 @@ static void the_battery_never_runs_empty(void)
 
 static void without_sensors_it_commands_stop(void)
 {
-    TEST_ASSERT_TRUE(canopy_sim_power_set(&run.robot.power, 50 * CANOPY_SIM_NM_PER_M, 500));
+    TEST_ASSERT_TRUE(canopy_sim_power_set(&run.nao.robot.power, 50 * CANOPY_SIM_NM_PER_M, 500));
     TEST_ASSERT_EQUAL(CANOPY_RUNNING, nao_in_process_tick(&run));
-    TEST_ASSERT_EQUAL(CANOPY_SIM_POWER_DO_TASK, run.power_mode);
-    TEST_ASSERT_EQUAL(CANOPY_RUNNING, canopy_loop_cycle(&run.loop, run.now + 400000));
+    TEST_ASSERT_EQUAL(CANOPY_SIM_POWER_DO_TASK, run.nao.power_mode);
+    TEST_ASSERT_EQUAL(CANOPY_RUNNING, canopy_loop_cycle(&run.host.loop, run.host.now + 400000));
     TEST_ASSERT_EQUAL(NAO_POWER_POWER_COMMAND_MODE_DO_TASK, nao_power_output->power_command.mode);
-    TEST_ASSERT_EQUAL(CANOPY_FAILURE, canopy_loop_cycle(&run.loop, run.now + 500000));
+    TEST_ASSERT_EQUAL(CANOPY_FAILURE, canopy_loop_cycle(&run.host.loop, run.host.now + 500000));
     TEST_ASSERT_EQUAL(NAO_POWER_POWER_COMMAND_MODE_STOP, nao_power_output->power_command.mode);
 }
 

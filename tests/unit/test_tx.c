@@ -451,6 +451,56 @@ static void a_frame_may_come_back_at_the_wrap_of_versions(void)
     every_frame_has_ended_once();
 }
 
+static void what_is_owed_is_a_value_that_was_posted_since(void)
+{
+    TEST_ASSERT_FALSE(canopy_tx_owes(&tx, URGENT));
+    post(URGENT, 1, LATE);
+    canopy_tx_service(&tx, 0);
+    canopy_tx_owe(&tx);
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, URGENT));
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, PLAIN));
+    boxes.aborted_is = CANOPY_CAN_SENT; /* the old one was on the wire */
+    post(URGENT, 2, LATE);
+    canopy_tx_service(&tx, 0);
+    TEST_ASSERT_EQUAL_UINT(1, boxes.out_count);
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, URGENT));
+    boxes_let_out(0);
+    post(URGENT, 3, LATE); /* it need not be the newest */
+    canopy_tx_service(&tx, 0);
+    TEST_ASSERT_FALSE(canopy_tx_owes(&tx, URGENT));
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, PLAIN));
+    for (unsigned frame = 0; frame < 5u; frame++) {
+        post(URGENT, 4, LATE);
+    }
+    TEST_ASSERT_FALSE(canopy_tx_owes(&tx, URGENT)); /* once paid, whatever is posted later */
+}
+
+static void what_is_owed_may_get_out_across_the_wrap_of_versions(void)
+{
+    slots[URGENT].posted = UINT32_MAX >> 2;
+    slots[URGENT].taken = UINT32_MAX >> 2;
+    slots[URGENT].out = UINT32_MAX >> 2;
+    canopy_tx_owe(&tx);
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, URGENT));
+    post(URGENT, 1, LATE); /* version 0 */
+    TEST_ASSERT_TRUE(canopy_tx_owes(&tx, URGENT));
+    canopy_tx_service(&tx, 0);
+    boxes_let_out(0);
+    canopy_tx_service(&tx, 0);
+    TEST_ASSERT_FALSE(canopy_tx_owes(&tx, URGENT));
+}
+
+static void what_is_held_back_counts_as_replaced(void)
+{
+    canopy_tx_hold(&tx);
+    TEST_ASSERT_EQUAL_UINT32(1, counted().replaced);
+    TEST_ASSERT_EQUAL_UINT32(0, counted().expired);
+    tx.held = UINT32_MAX;
+    tx.replaced = 1;
+    canopy_tx_hold(&tx);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, counted().replaced);
+}
+
 static void counters_stay_at_their_largest_value(void)
 {
     boxes.taken_is = CANOPY_CAN_SENT;
@@ -524,6 +574,9 @@ int main(void)
     RUN_TEST(an_error_of_the_driver_keeps_the_frame_until_its_deadline);
     RUN_TEST(versions_may_wrap);
     RUN_TEST(a_frame_may_come_back_at_the_wrap_of_versions);
+    RUN_TEST(what_is_owed_is_a_value_that_was_posted_since);
+    RUN_TEST(what_is_owed_may_get_out_across_the_wrap_of_versions);
+    RUN_TEST(what_is_held_back_counts_as_replaced);
     RUN_TEST(counters_stay_at_their_largest_value);
     RUN_TEST(kick_serves_or_lets_the_transmit_context_serve);
     RUN_TEST(a_bus_in_memory_needs_no_mailbox);

@@ -388,6 +388,66 @@ static void of_several_frames_the_first_deadline_counts(void)
     TEST_ASSERT_TRUE(canopy_tx_is_blocked(&tx));
 }
 
+static void a_trace_that_is_stopped_leaves_no_more(void)
+{
+    for (uint8_t frame = 0; frame < 3u; frame++) {
+        trace(frame, LATE);
+    }
+    canopy_tx_service(&tx, 0); /* one is in the mailbox */
+    canopy_tx_stop_trace(&tx);
+    canopy_tx_service(&tx, 10);
+    TEST_ASSERT_EQUAL_UINT(1, boxes.aborts);
+    TEST_ASSERT_FALSE(canopy_tx_is_busy(&tx));
+    TEST_ASSERT_EQUAL_UINT32(3, counted().trace_dropped);
+    canopy_tx_resume_trace(&tx);
+    trace(7, LATE);
+    canopy_tx_service(&tx, 20);
+    let_all_out(20);
+    TEST_ASSERT_EQUAL_UINT(1, boxes.out_count);
+    TEST_ASSERT_EQUAL_UINT8(7, boxes.out[0].data[0]);
+}
+
+static void what_cannot_be_taken_back_is_the_last_of_a_trace_that_is_stopped(void)
+{
+    can.abort = NULL;
+    trace(1, LATE);
+    trace(2, LATE);
+    canopy_tx_service(&tx, 0);
+    canopy_tx_stop_trace(&tx);
+    post(0, 3, LATE);
+    canopy_tx_service(&tx, 10);
+    TEST_ASSERT_EQUAL_UINT32(0, counted().trace_dropped);
+    let_all_out(20);
+    TEST_ASSERT_EQUAL_UINT(2, boxes.out_count); /* and the command */
+    TEST_ASSERT_EQUAL_UINT32(1, counted().trace_sent);
+    TEST_ASSERT_EQUAL_UINT32(1, counted().trace_dropped);
+}
+
+/* The transmit interrupt goes on when the loop hangs: it knows each frame's deadline by itself. */
+static void when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(bool can_abort, unsigned leave)
+{
+    can.abort = can_abort ? boxes_abort : NULL;
+    start(3);
+    for (uint16_t message = 0; message < (uint16_t)MESSAGES; message++) {
+        post(message, 1, 100);
+    }
+    canopy_tx_service(&tx, 0);
+    let_all_out(5000); /* the bus was blocked up to now: the first frame is out, and its interrupt comes */
+    TEST_ASSERT_EQUAL_UINT(leave, boxes.out_count);
+    TEST_ASSERT_EQUAL_UINT32(leave, counted().sent);
+    TEST_ASSERT_EQUAL_UINT32(MESSAGES - leave, counted().expired);
+}
+
+static void when_the_loop_hangs_the_interrupt_takes_back_what_is_late(void)
+{
+    when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(true, 1);
+}
+
+static void when_the_loop_hangs_and_nothing_can_be_taken_back_the_mailboxes_leave(void)
+{
+    when_the_loop_hangs_only_what_was_in_mailboxes_may_leave(false, 3);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -408,5 +468,9 @@ int main(void)
     RUN_TEST(a_driver_that_takes_nothing_is_a_blocked_bus_too);
     RUN_TEST(a_frame_that_only_loses_to_more_urgent_ones_does_not_make_it_a_blocked_bus);
     RUN_TEST(of_several_frames_the_first_deadline_counts);
+    RUN_TEST(a_trace_that_is_stopped_leaves_no_more);
+    RUN_TEST(what_cannot_be_taken_back_is_the_last_of_a_trace_that_is_stopped);
+    RUN_TEST(when_the_loop_hangs_the_interrupt_takes_back_what_is_late);
+    RUN_TEST(when_the_loop_hangs_and_nothing_can_be_taken_back_the_mailboxes_leave);
     return UNITY_END();
 }

@@ -41,6 +41,7 @@ void canopy_socketcan_restart(void *context);
 
 /** What the kernel says of an interface. */
 typedef struct {
+    unsigned index;                     /**< Its number. */
     bool has_echo;                      /**< IFF_ECHO */
     bool has_queue;                     /**< Frames may wait in the kernel. */
     bool is_controller;                 /**< It has the attributes of a CAN controller. */
@@ -48,14 +49,24 @@ typedef struct {
     canopy_can_controller_t controller; /**< Error state. */
 } canopy_socketcan_link_t;
 
-/** Asks the kernel by netlink. Blocks until its answer is there, which is at once. @return false: it does not say. */
-bool canopy_socketcan_ask_link(unsigned index, canopy_socketcan_link_t *link);
+/**
+ * Asks the kernel by netlink. Blocks until its answer is there, which is at once, unless another process is just changing
+ * interfaces. Not by ioctl() of a name: where there is no such interface the kernel looks for a module of that name, which
+ * starts a process (modprobe) and waits for its end.
+ * @return CANOPY_OK; CANOPY_ERROR_NOT_FOUND: there is no interface of this name; CANOPY_ERROR_UNSUPPORTED: the kernel does
+ *         not say, or the process may not ask
+ */
+canopy_error_t canopy_socketcan_ask_link(const char *name, canopy_socketcan_link_t *link);
 
 /** Does the process have CAP_NET_ADMIN? */
 bool canopy_socketcan_may_switch(void);
 
-/** Index of the interface of a name, 0: there is none; and whether it is up. */
-unsigned canopy_socketcan_find(int socket, const char *name, bool *up);
+/**
+ * Is the interface that had this number and this name still there, and is it up? By the number, so that nothing is asked of
+ * a name that does not exist.
+ * @return ACTIVE, DOWN or GONE
+ */
+canopy_can_controller_t canopy_socketcan_look(int socket, unsigned index, const char *name);
 
 /** Switches the interface off and on. @return false: it may not, or it fails. */
 bool canopy_socketcan_switch(canopy_socketcan_t *self);

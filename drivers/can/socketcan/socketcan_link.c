@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /** @file What the kernel says of an interface (rtnetlink), and switching it off and on. */
+#include <errno.h>
 #include <linux/can/netlink.h>
 #include <linux/capability.h>
 #include <linux/if_link.h>
@@ -118,7 +119,8 @@ static void read_link(canopy_socketcan_link_t *link, const char *answer, size_t 
     const attribute_t *part;
 
     memcpy(&info, answer + NLMSG_HDRLEN, sizeof info);
-    *link = (canopy_socketcan_link_t){.has_echo = (info.ifi_flags & FLAG_ECHO) != 0u, .has_queue = true};
+    *link = (canopy_socketcan_link_t){
+        .index = (unsigned)info.ifi_index, .has_echo = (info.ifi_flags & FLAG_ECHO) != 0u, .has_queue = true};
     while ((part = take(&attributes)) != NULL) {
         if (part->rta_type == IFLA_QDISC) {
             link->has_queue = !text_is(part, "noqueue"); /* while the interface is down it is "noop": not known yet */
@@ -128,13 +130,40 @@ static void read_link(canopy_socketcan_link_t *link, const char *answer, size_t 
     }
 }
 
-bool canopy_socketcan_ask_link(unsigned index, canopy_socketcan_link_t *link)
+/** What an answer of the kernel says of a link. @param answer `size` bytes @return as canopy_socketcan_ask_link() */
+static canopy_error_t read_answer(canopy_socketcan_link_t *link, const char *answer, size_t size)
+{
+    struct nlmsghdr header;
+    struct nlmsgerr error;
+
+    if (size < NLMSG_HDRLEN) {
+        return CANOPY_ERROR_UNSUPPORTED;
+    }
+    memcpy(&header, answer, sizeof header);
+    if (header.nlmsg_len > size) {
+        return CANOPY_ERROR_UNSUPPORTED;
+    }
+    if (header.nlmsg_type == NLMSG_ERROR && header.nlmsg_len >= NLMSG_LENGTH(sizeof error)) {
+        memcpy(&error, answer + NLMSG_HDRLEN, sizeof error);
+        return error.error == -ENODEV ? CANOPY_ERROR_NOT_FOUND : CANOPY_ERROR_UNSUPPORTED;
+    }
+    if (header.nlmsg_type != RTM_NEWLINK || header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
+        return CANOPY_ERROR_UNSUPPORTED;
+    }
+    read_link(link, answer, header.nlmsg_len);
+    return CANOPY_OK;
+}
+
+canopy_error_t canopy_socketcan_ask_link(const char *name, canopy_socketcan_link_t *link)
 {
     struct {
         struct nlmsghdr header;
         struct ifinfomsg info;
+        attribute_t attribute;
+        char name[IFNAMSIZ];
     } request = {.header = {.nlmsg_len = sizeof request, .nlmsg_type = RTM_GETLINK, .nlmsg_flags = NLM_F_REQUEST},
-                 .info = {.ifi_family = AF_UNSPEC, .ifi_index = (int)index}};
+                 .info = {.ifi_family = AF_UNSPEC},
+                 .attribute = {.rta_len = RTA_LENGTH(IFNAMSIZ), .rta_type = IFLA_IFNAME}};
     union {
         struct nlmsghdr header; /* for its alignment */
         char bytes[ANSWER_BYTES];
@@ -143,18 +172,14 @@ bool canopy_socketcan_ask_link(unsigned index, canopy_socketcan_link_t *link)
     int socket_number = socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE);
 
     if (socket_number < 0) {
-        return false;
+        return CANOPY_ERROR_UNSUPPORTED;
     }
+    (void)memcpy(request.name, name, strlen(name)); /* shorter than IFNAMSIZ: canopy_socketcan_open() has looked */
     if (send(socket_number, &request, sizeof request, 0) == (ssize_t)sizeof request) {
         size = recv(socket_number, &answer, sizeof answer, MSG_DONTWAIT); /* the kernel answers within send() */
     }
     (void)close(socket_number);
-    if (size < (ssize_t)NLMSG_LENGTH(sizeof(struct ifinfomsg)) || answer.header.nlmsg_type != RTM_NEWLINK ||
-        answer.header.nlmsg_len > (size_t)size || answer.header.nlmsg_len < NLMSG_LENGTH(sizeof(struct ifinfomsg))) {
-        return false;
-    }
-    read_link(link, answer.bytes, answer.header.nlmsg_len);
-    return true;
+    return size >= 0 ? read_answer(link, answer.bytes, (size_t)size) : CANOPY_ERROR_UNSUPPORTED;
 }
 
 bool canopy_socketcan_may_switch(void)
@@ -168,25 +193,18 @@ bool canopy_socketcan_may_switch(void)
 static void name_into(struct ifreq *request, const char *name)
 {
     *request = (struct ifreq){0};
-    (void)memcpy(request->ifr_name, name, strlen(name)); /* shorter than IFNAMSIZ: canopy_socketcan_open() has looked */
+    (void)memcpy(request->ifr_name, name, strlen(name)); /* shorter than IFNAMSIZ, as above */
 }
 
-unsigned canopy_socketcan_find(int socket, const char *name, bool *up)
+canopy_can_controller_t canopy_socketcan_look(int socket, unsigned index, const char *name)
 {
-    struct ifreq request;
-    unsigned index;
+    struct ifreq request = {.ifr_ifindex = (int)index};
 
-    name_into(&request, name);
-    if (ioctl(socket, SIOCGIFINDEX, &request) != 0) {
-        return 0;
+    if (ioctl(socket, SIOCGIFNAME, &request) != 0 || strncmp(request.ifr_name, name, sizeof request.ifr_name) != 0 ||
+        ioctl(socket, SIOCGIFFLAGS, &request) != 0) {
+        return CANOPY_CAN_CONTROLLER_GONE;
     }
-    index = (unsigned)request.ifr_ifindex;
-    name_into(&request, name);
-    if (ioctl(socket, SIOCGIFFLAGS, &request) != 0) {
-        return 0;
-    }
-    *up = (request.ifr_flags & IFF_UP) != 0;
-    return index;
+    return (request.ifr_flags & IFF_UP) != 0 ? CANOPY_CAN_CONTROLLER_ACTIVE : CANOPY_CAN_CONTROLLER_DOWN;
 }
 
 /** The kernel tells each socket that the interface went down. We know. */

@@ -146,7 +146,7 @@ void canopy_socketcan_learn(canopy_socketcan_t *self)
 {
     canopy_socketcan_link_t link = {.has_queue = true}; /* the worst, if the kernel does not say */
 
-    (void)canopy_socketcan_ask_link(self->index, &link);
+    (void)canopy_socketcan_ask_link(self->name, &link);
     self->controller = link.controller;
     self->is_controller = link.is_controller;
     self->restarts_itself = link.restarts_itself;
@@ -193,10 +193,21 @@ static canopy_error_t open_sockets(canopy_socketcan_t *self, unsigned index)
     return error == CANOPY_OK ? bind_to(self->events, index) : error;
 }
 
+/** Number of an interface; 0: there is none. */
+static unsigned index_of(const char *name)
+{
+    canopy_socketcan_link_t link = {0};
+
+    if (canopy_socketcan_ask_link(name, &link) == CANOPY_ERROR_UNSUPPORTED) {
+        return if_nametoindex(name); /* may take long: see canopy_socketcan_ask_link() */
+    }
+    return link.index;
+}
+
 canopy_error_t canopy_socketcan_bind(canopy_socketcan_t *self)
 {
     const bool first = self->socket < 0;
-    const unsigned index = if_nametoindex(self->name);
+    const unsigned index = index_of(self->name);
     canopy_error_t error;
 
     if (!first && index == 0u) {

@@ -104,15 +104,8 @@ void canopy_socketcan_take_events(canopy_socketcan_t *self)
 
 static void look(canopy_socketcan_t *self, uint64_t now)
 {
-    bool up = false;
-    unsigned index = canopy_socketcan_find(self->socket, self->name, &up);
-
     self->next_look = now + CANOPY_SOCKETCAN_LOOK_US;
-    if (index == 0u || index != self->index) {
-        link_went(self, CANOPY_CAN_CONTROLLER_GONE);
-    } else {
-        link_went(self, up ? CANOPY_CAN_CONTROLLER_ACTIVE : CANOPY_CAN_CONTROLLER_DOWN);
-    }
+    link_went(self, canopy_socketcan_look(self->socket, self->index, self->name));
 }
 
 canopy_can_controller_t canopy_socketcan_state(void *context)

@@ -15,6 +15,7 @@ from canopy.check.run import BusOptions, Report, check
 from canopy.compiler.cli import in_range, read_type_options, type_options
 from canopy.compiler.errors import CompileError, nearest
 from canopy.compiler.limits import PERIOD_MS
+from canopy.compiler.output import print_note
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo_lines
 
@@ -105,6 +106,7 @@ def command(
             echo_lines(str(error), err=True)
             unreadable = True
             continue
+        print_note(one.note)
         # What is wrong with the bus is said once, not for each tree.
         report.findings += [finding for finding in one.findings if finding not in report.findings]
         report.allowed += one.allowed

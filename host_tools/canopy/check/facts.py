@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from canopy.check.bus_facts import BusFacts
-from canopy.check.status_sets import Outcome, Statuses, outcome
+from canopy.check.status_sets import Outcome, R, Statuses, outcome
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.tree_reader import Node, Tree
@@ -76,6 +76,16 @@ class Facts:
     def statuses(self, node: Node) -> Statuses:
         """All statuses that the node can return."""
         return self._outcomes[id(node)].statuses
+
+    def runs(self, node: Node) -> bool:
+        """Can it be RUNNING, as far as is known? What nobody declared may be an action of one tick."""
+        if R not in self.statuses(node):
+            return False
+        own = [other for other in self.below(node) if not other.children or other.type.category == "DECORATOR"]
+        sure = [other for other in own if other.leaf is None or not other.leaf.is_guessed]
+        return any(R in self.statuses(other) for other in sure if not other.children) or any(
+            R in self.statuses(other) and R not in self.statuses(other.children[0]) for other in sure if other.children
+        )
 
     def ticked(self, node: Node) -> tuple[bool, ...]:
         """For each child of the node: can it be ticked?"""

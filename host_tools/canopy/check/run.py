@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from canopy.check.bus_facts import BusFacts
@@ -26,7 +26,7 @@ from canopy.compiler.xml_reader import Element
 
 _ALLOW = re.compile(r"canopy:allow\s+([\w-]+(?:\s*,\s*[\w-]+)*)")
 _BITRATE = 500_000
-OF_THE_WHOLE = ("root-can-fail", "condition-writes", "unused-port", "unused-tree")
+OF_THE_WHOLE = ("root-can-fail", "condition-writes", "unused-port", "unused-tree", "refused-name")
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class Report:
 
     findings: list[Finding] = field(default_factory=list)
     allowed: int = 0
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -135,12 +136,13 @@ def check(path: Path, rules: Iterable[Rule], bus: BusOptions | None = None, type
     """
     wanted = list(rules)
     report = Report()
-    types = types or Options()
+    types = replace(types or Options(), undeclared=True)
     try:
         facts = _load(path, bus, types)
     except CompileError as error:
         report.findings = _refused(path, wanted, error)
         return report
+    report.note = facts.tree.foreign.note()
     files = dict.fromkeys([str(path), *(node.place.file for node in facts.nodes)])
     allowed = {element.place: _allowed(element) for file in files for element in facts.elements(file)}
     for places, comment in facts.bus.comments() if facts.bus is not None else ():

@@ -310,6 +310,8 @@ def leaf_statuses(node: Node) -> Statuses:
     if node.type.name == "TestNode":
         status, delay = node.parameters[:2]
         return _given(status) | ({R} if delay else NONE)
+    if node.leaf is not None and node.leaf.is_guessed:
+        return frozenset((S, F, R))  # a condition, or an action of either kind
     declared = node.leaf.returns if node.leaf is not None else ()
     result = frozenset(declared) or LEAVES.get(node.type.name, ANY)
     if node.leaf is not None and (node.leaf.reads or any(_is_signal(bound) for bound in node.bound)):

@@ -4,52 +4,24 @@
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 from canopy.compiler.blackboard import Entry, SignalName, Use
+from canopy.compiler.bound_ports import Bindings, BoundPort, Ports
 from canopy.compiler.bus_reader import Bus
-from canopy.compiler.errors import CompileError, Place
+from canopy.compiler.errors import MOST_NAMES, CompileError, Errors, Place
 from canopy.compiler.leaf_c import writes_texts
-from canopy.compiler.leaf_model import Leaf, Port
-from canopy.compiler.port_types import ANY, BOOL, DOUBLE, INT32, INT64, TEXT, Options, PortType, literal
+from canopy.compiler.port_types import ANY, BOOL, DOUBLE, INT32, INT64, TEXT, Options, PortType
 from canopy.compiler.script.compile import Compiler, Texts, UntypedError, guess
-from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, Name, Number, ScriptError, parse, parts
-from canopy.compiler.script.values import Const, Double, Num, TextConst, Value
+from canopy.compiler.script.values import Const, Double, Num, Value
 from canopy.compiler.script_bodies import Bodies, entry_value
-from canopy.compiler.tree import Bound, Node, Script, Tree
+from canopy.compiler.tree import Node, Script, Tree
 from canopy.escape.c import mark_c
+from canopy.tree.lists import items_of
 
-
-@dataclass(frozen=True)
-class BoundPort:
-    """A port of one node in C: its initialiser in the constant table, and what is copied before each call."""
-
-    constant: str
-    copy: str | None = None
-    updates: str | None = None
-
-
-def _bound_port(constant: str, copy: str | None = None, updates: str | None = None) -> BoundPort:
-    """A BoundPort of C that was made here."""
-    return BoundPort(*mark_c((constant, copy, updates)))
-
-
-@dataclass
-class Bindings:
-    """What the tables and templates need besides the nodes: entries, texts, and each node's ports."""
-
-    entries: tuple[Entry, ...] = ()
-    texts: tuple[str, ...] = ()
-    leaves: dict[str, Leaf] = field(default_factory=dict)
-    ports: dict[int, tuple[BoundPort, ...]] = field(default_factory=dict)
-    counted_ports: set[tuple[str, str]] = field(default_factory=set)
-
-    @cached_property
-    def text_places(self) -> dict[str, int]:
-        """The place of each text."""
-        return {text: place for place, text in enumerate(self.texts)}
+_Item = TypeVar("_Item")
 
 
 def preorder(root: Node) -> list[Node]:
@@ -81,39 +53,69 @@ class _Binder:
         self._parsed: dict[int, tuple[Expression, ...]] = {}
         self._assigned: dict[int, list[tuple[Script, Assignment]]] = {}
         self._setting: dict[int, list[Script]] = {}
+        self._errors = Errors()
+        self._failed: set[int] = set()
 
     def bind(self) -> Bindings:
-        """Everything, in the order in which each step needs the one before."""
-        for script in self._tree.scripts:
-            if script.role in ("condition", "action"):
-                self._read(script)
-        self._check_existing()
-        for entry in self._tree.board.entries:
-            entry.settle_type()
-        for script in self._tree.scripts:
+        """Everything, in the order in which each step needs the one before; all errors of a step together."""
+        scripts = self._tree.scripts
+        self._each((script for script in scripts if script.role in ("condition", "action")), self._read)
+        self._each(self._tree.board.entries, self._check_existing)
+        self._each(self._tree.board.entries, Entry.settle_type)
+        self._errors.raise_any()
+        for script in scripts:
             if script.role == "set":
                 self._setting.setdefault(id(script.target), []).append(script)
         self._infer()
-        leaves = self._settle_ports()
-        self._check_entries()
+        ports = Ports(self._tree, self._nodes, self._bus, self._texts, self._floats, self._name)
+        bindings = Bindings(leaves=ports.settle())
+        self._each(self._tree.board.entries, self._check_entry)
+        self._errors.raise_any()
         bodies = Bodies(self._bus, self._texts, self._floats, {id(node): i for i, node in enumerate(self._nodes)})
-        for script in self._tree.scripts:
-            try:
-                script.body = mark_c(bodies.body(script, self._parsed.get(id(script), ())))
-            except ScriptError as error:
-                raise script_error(script, error) from error
-        for node in self._nodes:
-            if node.leaf is not None and writes_texts(node.leaf):
-                for text in node.leaf.texts:
-                    self._texts.index(text)
-        bindings = Bindings(leaves=leaves)
+        self._each(scripts, lambda script: self._write(script, bodies))
+        self._texts_of_leaves()
+        bodies.all_texts_are_known = True
+        self._each(
+            (script for script in scripts if script.role == "switch"), lambda script: self._write(script, bodies)
+        )
         for node in self._nodes:
             if node.leaf is not None and node.bound:
-                bindings.ports[id(node)] = tuple(self._port(node, bound, bindings) for bound in node.bound)
+                bindings.ports[id(node)] = self._ports(ports, node, bindings)
+        self._errors.raise_any()
         bindings.entries = tuple(e for e in self._tree.board.entries if not e.is_constant and e.uses)
         texts = self._texts.all
         bindings.texts = texts if len(texts) > 1 or self._uses_text() else ()
         return bindings
+
+    def _each(self, items: Iterable[_Item], step: Callable[[_Item], None]) -> None:
+        """Does it with every item, and collects what is wrong."""
+        for item in items:
+            try:
+                step(item)
+            except CompileError as error:
+                self._errors.add(error)
+
+    def _ports(self, ports: Ports, node: Node, bindings: Bindings) -> tuple[BoundPort, ...]:
+        found: list[BoundPort] = []
+        self._each(node.bound, lambda bound: found.append(ports.bound(node, bound, bindings)))
+        return tuple(found)
+
+    def _write(self, script: Script, bodies: Bodies) -> None:
+        try:
+            script.body = mark_c(bodies.body(script, self._parsed.get(id(script), ())))
+        except ScriptError as error:
+            raise script_error(script, error) from error
+
+    def _texts_of_leaves(self) -> None:
+        """Texts that no script has: those that leaves write, and those that entries begin with."""
+        for node in self._nodes:
+            if node.leaf is not None and writes_texts(node.leaf):
+                for text in node.leaf.texts:
+                    self._texts.index(text)
+        for entry in self._tree.board.entries:
+            if entry.initial is not None and entry.type.holds_texts and not entry.is_constant:
+                for text in [entry.initial] if entry.type == TEXT else items_of(entry.initial):
+                    self._texts.index(text)
 
     def _uses_text(self) -> bool:
         return any(entry.type == TEXT and not entry.is_constant for entry in self._tree.board.entries)
@@ -128,7 +130,7 @@ class _Binder:
             self._parsed[id(script)] = parse(script.text)
         except ScriptError as error:
             raise script_error(script, error) from error
-        for statement in self._parsed[id(script)]:
+        for statement in (part for whole in self._parsed[id(script)] for part in parts(whole)):
             if isinstance(statement, Assignment) and "." not in statement.target.name:
                 place = script.place(statement.index)
                 target = script.scope.resolve(statement.target.name, place)
@@ -136,17 +138,16 @@ class _Binder:
                 target.connect(Use(ANY, place, f'{script.attribute}="{script.text}"', True))
                 self._assigned.setdefault(id(target), []).append((script, statement))
 
-    def _check_existing(self) -> None:
-        for entry in self._tree.board.entries:
-            mine = self._assigned.get(id(entry), [])
-            creating = [a for _, a in mine if a.operator == ":="]
-            others = sum(use.writes for use in entry.uses) - len(mine)
-            if mine and not creating and not others and entry.initial is None:
-                script, statement = mine[0]
-                message = f"'{statement.operator}' needs an entry that is there, and nothing creates '{entry.name}'"
-                raise script_error(
-                    script, ScriptError(statement.index, message, f"write {entry.name} := … where it begins")
-                )
+    def _check_existing(self, entry: Entry) -> None:
+        mine = self._assigned.get(id(entry), [])
+        creating = [a for _, a in mine if a.operator == ":="]
+        others = len(entry.uses) - len(mine)  # a port that is connected to it is enough, as in BehaviorTree.CPP
+        if mine and not creating and not others and entry.initial is None:
+            script, statement = mine[0]
+            message = f"'{statement.operator}' needs an entry that is there, and nothing creates '{entry.name}'"
+            raise script_error(
+                script, ScriptError(statement.index, message, f"write {entry.name} := … where it begins")
+            )
 
     def _infer(self) -> None:
         """Types of entries that no port declares: from what is written to them, until nothing more is learnt.
@@ -162,7 +163,12 @@ class _Binder:
             entry = entries[index]
             if entry.type.kind != "any":
                 continue
-            kind, unknown = self._inferred(entry)
+            try:
+                kind, unknown = self._inferred(entry)
+            except CompileError as error:
+                self._errors.add(error)
+                self._failed.add(id(entry))
+                continue
             for new in range(known, len(entries)):
                 heapq.heappush(due, (turn, new))
             known = len(entries)
@@ -263,133 +269,30 @@ class _Binder:
                 best = kind
         return best
 
-    def _check_entries(self) -> None:
-        for entry in self._tree.board.entries:
-            if not entry.uses or entry.is_constant:
-                continue
-            given = entry.initial is not None or entry.is_written
-            if not given:
-                use = entry.uses[0]
-                scope = f" of '{entry.path}'" if entry.path else ""
-                known = [e.name for e in self._tree.board.entries if e.path == entry.path and e is not entry]
-                hint = f"entries here: {', '.join(known)}; " if known else ""
-                raise CompileError(
-                    use.place,
-                    f"{use.what}: nothing writes entry '{entry.name}'{scope}",
-                    f'{hint}the program\'s own inputs are ports of the main tree: <SubTree ID="{self._tree.id}">'
-                    f'<input_port name="{entry.name}" type=… default=…/></SubTree> in <TreeNodesModel>',
-                )
-            if entry.type.kind == "any":
-                use = entry.uses[0]
-                raise CompileError(
-                    use.place, f"nothing gives entry '{entry.name}' a type", "declare the type of a port"
-                )
-
-    # Ports
-
-    def _settle_ports(self) -> dict[str, Leaf]:
-        """The leaves in use, with types for ports that have none, and with the messages that their ports read."""
-        leaves = dict(self._tree.leaves)
-        for node in self._nodes:
-            if node.leaf is None:
-                continue
-            leaf = leaves[node.leaf.id]
-            for bound in node.bound:
-                if isinstance(bound.target, SignalName):
-                    message = bound.target.text.partition(".")[0]
-                    if not bound.target.text.endswith(".fresh") and message not in leaf.reads:
-                        leaf = replace(leaf, reads=(*leaf.reads, message))
-            if node.bound:
-                both = zip(leaf.ports, node.bound, strict=True)
-                leaf = replace(leaf, ports=tuple(self._settled(port, bound) for port, bound in both))
-            leaves[leaf.id] = leaf
-        for node in self._nodes:
-            if node.leaf is not None:
-                node.leaf = leaves[node.leaf.id]
-                for bound, port in zip(node.bound, node.leaf.ports, strict=True):
-                    bound.port = port
-        return leaves
-
-    @staticmethod
-    def _settled(port: Port, bound: Bound) -> Port:
-        if port.type.kind != "any":
-            return port
-        if isinstance(bound.target, Entry):
-            kind = bound.target.type
-            if bound.target.is_constant:
-                kind = _literal_kind(bound.target.initial or "")
-            return replace(port, type=kind) if kind.kind != "any" else port
-        return replace(port, type=_literal_kind(bound.text or "")) if bound.text is not None else port
-
-    def _port(self, node: Node, bound: Bound, bindings: Bindings) -> BoundPort:
-        assert node.leaf is not None
-        port = bound.port
-        where = f"port '{port.name}' of '{node.leaf.id}'"
-        if port.type.kind == "any":
-            raise CompileError(bound.place, f"{where}: nothing gives it a type", f"declare it, at {port.place}")
-        if isinstance(bound.target, Entry):
-            return self._connected(node.leaf, bound, bound.target, where, bindings)
-        if isinstance(bound.target, SignalName):
-            return self._signal(bound, bound.target, where)
-        if bound.text is None:  # nothing is connected
-            return _bound_port("NULL" if port.writes or port.type.kind == "user" else _zero(port.type))
-        return _bound_port(_constant(bound.text, port.type, where, bound.place))
-
-    def _signal(self, bound: Bound, target: SignalName, where: str) -> BoundPort:
-        kind = bound.port.type
-        compiler = Compiler(self._tree.board.main, bound.place, self._bus, self._texts, self._floats)
-        try:
-            value = compiler.signal(target.text, 0)
-            if isinstance(value, Double) and kind.kind != "float":
-                raise ScriptError(0, f"a floating-point signal would be cut to {kind}", "convert it in a script")
-            c = compiler.storing.convert(value, kind, 0)
-        except ScriptError as error:
-            raise CompileError(bound.place, f"{where}: {error.message}", error.help_text) from error
-        return _bound_port(_zero(kind), stripped(c))
-
-    def _connected(self, leaf: Leaf, bound: Bound, entry: Entry, where: str, bindings: Bindings) -> BoundPort:
-        port = bound.port
-        if entry.is_constant:
-            return _bound_port(_constant(entry.initial or "", port.type, where, entry.place))
-        if entry.type != port.type:
-            first = next((use for use in entry.uses if use.type == entry.type), entry.uses[0])
+    def _check_entry(self, entry: Entry) -> None:
+        if not entry.uses or entry.is_constant or id(entry) in self._failed:
+            return
+        use = entry.uses[0]
+        message = entry.name.partition(".")[0]
+        if "." in entry.name and any(message == other.name for other in (*self._bus.receive, *self._bus.send)):
             raise CompileError(
-                bound.place,
-                f"{where} is {port.type}, but entry '{entry.name}' is {entry.type}",
-                f"the other end is {first.what}, at {first.place}",
+                use.place,
+                f"'{entry.name}' is written by a node, and '{message}' is a message of the bus",
+                "give the entry another name",
             )
-        if port.writes:
-            if entry.counted:
-                bindings.counted_ports.add((leaf.id, port.name))
-            updates = f"&memory.entries.{entry.c_name}_updates" if entry.counted else None
-            return _bound_port(f"&memory.entries.{entry.c_name}", updates=updates)
-        if port.type.kind == "user":
-            return _bound_port(f"&memory.entries.{entry.c_name}")
-        if port.type.kind == "text":
-            place, texts = f"app->entries.{entry.c_name}", f"{self._name}_texts"
-            # A leaf may have written any number.
-            return _bound_port("NULL", f"{texts}[{place} < {texts.upper()} ? {place} : 0u]")
-        return _bound_port(_zero(port.type), f"app->entries.{entry.c_name}")
-
-
-def _literal_kind(text: str) -> PortType:
-    value = guess(text)
-    if isinstance(value, TextConst) or not isinstance(value, Const):
-        return TEXT
-    if value.is_bool:
-        return BOOL
-    if value.value.denominator != 1:
-        return TEXT
-    return INT32 if -(2**31) <= value.value < 2**31 else INT64
-
-
-def _zero(kind: PortType) -> str:
-    return {"bool": "false", "float": "0", "text": "NULL"}.get(kind.kind, "0")
-
-
-def _constant(text: str, kind: PortType, where: str, place: Place) -> str:
-    c = literal(text, kind, where, place)
-    return f"&(const {kind.c}){{{c}}}" if kind.kind == "user" else c
+        if entry.initial is None and not entry.is_written:
+            scope = f" of '{entry.path}'" if entry.path else ""
+            known = [e.name for e in self._tree.board.entries if e.path == entry.path and e is not entry]
+            hint = f"entries here: {', '.join(known[:MOST_NAMES])}; " if known else ""
+            raise CompileError(
+                use.place,
+                f"{use.what}: nothing writes entry '{entry.name}'{scope}",
+                f'{hint}the program\'s own inputs are ports of the main tree: <SubTree ID="{self._tree.id}">'
+                f'<input_port name="{entry.name}" type=… default=…/></SubTree> in <TreeNodesModel>; '
+                f"canopy model {self._tree.path} writes it",
+            )
+        if entry.type.kind == "any":
+            raise CompileError(use.place, f"nothing gives entry '{entry.name}' a type", "declare the type of a port")
 
 
 def bind(tree: Tree, bus: Bus, options: Options, name: str) -> Bindings:

@@ -6,11 +6,16 @@ Every name resolves here to one entry, a member of the application's static obje
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from canopy.compiler.errors import CompileError, Place, nearest
 from canopy.compiler.names import snake
 from canopy.compiler.port_types import ANY, PortType
+
+# Of BehaviorTree.CPP's entries, which scripts need not be able to name.
+_NAME = re.compile(r"[^\W\d][\w]*([ ./-]+\w+)*")
+MAX_NAME = 1_000
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,10 @@ class Blackboard:
 
     def __init__(self) -> None:
         self.entries: list[Entry] = []
+        self.dotted: set[str] = set()
+        """Names with a dot that are entries all the same: a node writes them."""
+        self.enums: dict[str, int] = {}
+        """What names of enums' values mean in scripts."""
         self.main = Scope(self, "")
         self._c_names: dict[str, int] = {}  # with the last number that was put behind it
 
@@ -142,9 +151,11 @@ class Scope:
         scope: Scope = self
         if name.startswith("@"):
             scope, name = self.root, name[1:]
-        if not name.isidentifier() and not all(part.isidentifier() for part in name.split(".")):
-            raise CompileError(place, f"'{name}' is not the name of an entry", "letters, digits and _; Message.Signal")
-        if "." in name:
+        if not _NAME.fullmatch(name) or len(name) > MAX_NAME:
+            raise CompileError(
+                place, f"'{name}' is not the name of an entry", "letters, digits and _ - / . or a blank; Message.Signal"
+            )
+        if "." in name and name not in self.board.dotted and all(map(str.isidentifier, name.split("."))):
             return SignalName(name)
         while name not in scope.names and scope.autoremap and not name.startswith("_") and scope.parent is not None:
             scope = scope.parent

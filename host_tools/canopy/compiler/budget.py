@@ -27,6 +27,7 @@ NODE_RAM = 1  # its status
 TRACED_NODE_RAM = 2  # and the one that the trace told last
 WORD_RAM = 2
 MAILBOXES_MAX = 4  # CANOPY_CAN_MAILBOXES_MAX
+"""Enough for a bus-off at a period of 50 ms or more: the first restart comes after 50 ms."""
 SIZES |= {"int64_t": 8, "uint64_t": 8, "pointer": 4, "float": 4, "double": 8}
 
 
@@ -40,7 +41,9 @@ def struct_size(members: Iterable[tuple[int, int]]) -> tuple[int, int]:
 
 
 def scalar(c_type: str) -> tuple[int, int]:
-    """(size, alignment) of a scalar type."""
+    """(size, alignment) of a scalar type, or of a value of any type."""
+    if c_type == "canopy_value_t":
+        return struct_size([(4, 4), (8, 8), (8, 8), (4, 4)])
     return SIZES[c_type], SIZES[c_type]
 
 
@@ -99,17 +102,21 @@ class ImageCost:
     tables: int = 0
 
 
+def _trace_ring(capacity: int) -> tuple[int, int]:
+    u8, u32, u64 = (scalar(t) for t in ("uint8_t", "uint32_t", "uint64_t"))
+    return array(struct_size([u64, u32, *[u8] * 9]), capacity)
+
+
 def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) -> int:
     """Size of the application's static object: the struct that the template application.c.j2 declares."""
     u8, u16, u32, u64, pointer = (scalar(t) for t in ("uint8_t", "uint16_t", "uint32_t", "uint64_t", "pointer"))
     nodes = max(len(table.rows), images.nodes)
     outputs = sum(len(message.signals) for message in bus.send)
     instance = struct_size([*[pointer] * 4, u64, u32, u16])
-    bus_state = struct_size([*[pointer] * 4, *[u32] * 8, u8])
+    bus_state = struct_size([*[pointer] * 4, *[u32] * 8, u8, u16])
     trace_state = struct_size([pointer, pointer, u32, u32, *[u16] * 8, *[u8] * 4])
     rx_state = struct_size([u64, *[u8] * 6, u16])
-    tx_slot = struct_size([array(u64, 2), *[u32] * 4, *[u8] * 3])
-    tx_trace = struct_size([u64, u32, *[u8] * 9])
+    tx_slot = struct_size([array(u64, 2), *[u32] * 5, *[u8] * 4])
     tx_mailbox = struct_size([u64, u32, u16, u8])
     tx = struct_size(
         [
@@ -117,8 +124,8 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) ->
             u32,
             u16,
             u8,
-            *[u32] * 3,
-            *[u8] * 4,
+            *[u32] * 4,
+            *[u8] * 6,
             u64,
             array(tx_mailbox, MAILBOXES_MAX),
             *[u32] * 5,
@@ -135,7 +142,7 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) ->
             *([trace_state] if trace is not None else []),
             tx,
             array(tx_slot, max(1, len(bus.send))),
-            array(tx_trace, trace_capacity(trace)),
+            _trace_ring(trace.capacity if trace is not None else 1),
             image_in,
             image_out,
             entries_size(table),
@@ -149,11 +156,6 @@ def ram_bytes(table: Table, bus: Bus, images: ImageCost, trace: Trace | None) ->
             images.memory,
         ]
     )[0]
-
-
-def trace_capacity(trace: Trace | None) -> int:
-    """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-    return 1 << max(0, (trace.frames_max if trace is not None else 1) - 1).bit_length()
 
 
 def port_size(port: Port) -> tuple[int, int]:

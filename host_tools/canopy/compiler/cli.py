@@ -15,12 +15,12 @@ from canopy.compiler.budget import Budget
 from canopy.compiler.emit import load_application, render
 from canopy.compiler.errors import CompileError, Place
 from canopy.compiler.image_room import DEFAULT_USES, IMAGE_NODES, IMAGE_USES
-from canopy.compiler.limits import BITRATE, PERIOD_MS, Limits
+from canopy.compiler.limits import BITRATE, PERIOD_MS, TRACE_TICKS, Limits
 from canopy.compiler.names import is_c_identifier
-from canopy.compiler.output import INPUT_ERROR, dependencies, fail, write_or_exit
-from canopy.compiler.port_types import Options, is_fixed_point
+from canopy.compiler.output import INPUT_ERROR, dependencies, fail, print_note, write_or_exit
+from canopy.compiler.port_types import Options, is_fixed_point, is_queue
 from canopy.compiler.stubs import stubs
-from canopy.compiler.trace import Entries, Trace, TraceOptions
+from canopy.compiler.trace import TICKS_DEFAULT, Entries, Trace, TraceOptions
 from canopy.escape import c
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo
@@ -39,7 +39,7 @@ def _print_trace(budget: Budget, trace: Trace) -> None:
     idle, worst = budget.trace_load_percent or (0.0, 0.0)
     values = f", {len(trace.values)} values" if trace.values else ""
     load = f"{idle:6.2f} % of the bus while nothing changes, {worst:.2f} % at most"
-    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM")
+    echo(f"  trace  {load}; {budget.trace_ram_bytes} bytes of RAM, room for {trace.ticks} ticks without a bus")
     echo(f"         {trace.nodes} nodes{values}, all known within {trace.known_within_ms} ms")
 
 
@@ -92,11 +92,43 @@ main_tree_option = click.option(
 )
 
 
+def _keep(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> None:
+    """Keeps an option that all commands over trees have, and that only read_type_options() asks for."""
+    context.meta[f"canopy.{parameter.name}"] = value
+
+
+def _kept(name: str) -> tuple[str, ...]:
+    context = click.get_current_context(silent=True)
+    return context.meta.get(f"canopy.{name}", ()) if context is not None else ()
+
+
+foreign_option = click.option(
+    "--foreign",
+    multiple=True,
+    metavar="NAME",
+    expose_value=False,
+    callback=_keep,
+    help="An attribute or metadata key of another tool that looks like a misspelt one of Canopy's.",
+)
+
+
+search_option = click.option(
+    "--search",
+    multiple=True,
+    metavar="PATH",
+    expose_value=False,
+    callback=_keep,
+    help="A folder, a Groot2 project or a file with trees and models that TREE does not include.",
+)
+
+
 def type_options(command: _Command) -> _Command:
     """The options about types and includes, of the commands that look into ports and scripts."""
     for option in (
         main_tree_option,
         package_option,
+        search_option,
+        foreign_option,
         click.option("--type-map", multiple=True, metavar="CXX=C", help="A C++ type of the tree, and your C type."),
         click.option(
             "--allow-unset-ports",
@@ -135,7 +167,7 @@ class HexNumber(click.ParamType[int]):
         return number
 
 
-def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOptions | None:
+def _trace(base: int | None, guard: int | None, entries: Entries, ticks: int) -> TraceOptions | None:
     if base is None:
         if guard is not None or entries != "all":
             raise CompileError(
@@ -144,7 +176,7 @@ def _trace(base: int | None, guard: int | None, entries: Entries) -> TraceOption
                 "for example --trace 0x600",
             )
         return None
-    return TraceOptions(base, guard, entries)
+    return TraceOptions(base, guard, entries, ticks)
 
 
 def in_range(limits: Limits) -> click.IntRange:
@@ -167,6 +199,19 @@ def read_packages(packages: tuple[str, ...]) -> dict[str, Path]:
     return folders
 
 
+def read_search() -> tuple[Path, ...]:
+    """What `search_option` was given.
+
+    Raises:
+        CompileError: there is nothing at a path.
+    """
+    places = tuple(Path(place) for place in _kept("search"))
+    for place in places:
+        if not place.exists():
+            raise CompileError(Place(f"--search {place}"), "is not there", "a folder, a .btproj, or a tree file")
+    return places
+
+
 def read_type_options(
     include: str | None,
     floats: bool,
@@ -183,7 +228,7 @@ def read_type_options(
     result = {}
     for pair in type_map:
         cxx, found, c_type = pair.rpartition("=")
-        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type)):
+        if not found or not (is_c_identifier(c_type.strip()) or is_fixed_point(c_type) or is_queue(c_type)):
             raise CompileError(Place("--type-map"), f"'{pair}' is not CXX=C", "for example nav_msgs::msg::Path=path_t")
         result[cxx.strip()] = c_type.strip()
     if include is not None:
@@ -191,7 +236,16 @@ def read_type_options(
             c.header(include)
         except ValueError as error:
             raise CompileError(Place("--include"), str(error)) from error
-    return Options(floats, result, include, read_packages(packages), unset_ports, main_tree)
+    return Options(
+        floats,
+        result,
+        include,
+        read_packages(packages),
+        unset_ports,
+        main_tree,
+        search=read_search(),
+        foreign=frozenset(_kept("foreign")),
+    )
 
 
 def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
@@ -251,6 +305,13 @@ def _images(nodes: int | None, uses: int | None) -> tuple[int, int] | None:
 @click.option(
     "--trace-guard", type=HexNumber(0, 0xFFFF), metavar="DATA_ID", help="Protect CanopyTick by E2E Profile 11."
 )
+@click.option(
+    "--trace-ticks",
+    default=TICKS_DEFAULT,
+    show_default=True,
+    type=in_range(TRACE_TICKS),
+    help="Keep the trace of so many ticks while the bus lets nothing through.",
+)
 @click.option("--max-ram", type=click.IntRange(0), help="Fail when the static object is larger than so many bytes.")
 @click.option("--max-flash", type=click.IntRange(0), help="Fail when the tables are larger than so many bytes.")
 @click.option("--costs", is_flag=True, help="Print what each kind of node costs, too.")
@@ -279,6 +340,7 @@ def command(
     trace_base: int | None,
     trace_entries: Entries,
     trace_guard: int | None,
+    trace_ticks: int,
     max_ram: int | None,
     max_flash: int | None,
     costs: bool,
@@ -298,7 +360,7 @@ def command(
         options = read_type_options(include, floats, unset_ports, type_map, packages, main_tree)
         images = _images(image_nodes, image_uses)
         others = Others(foreign_load, foreign_burst, tx_latency_us)
-        trace = _trace(trace_base, trace_guard, trace_entries)
+        trace = _trace(trace_base, trace_guard, trace_entries, trace_ticks)
         application = load_application(
             name or tree.stem, tree, dbc, node, period_ms, bitrate, include, options, images, others, trace
         )
@@ -322,6 +384,7 @@ def command(
             echo(f"{tree}: error: {what} budget exceeded: {used} of {most} bytes", err=True)
             sys.exit(INPUT_ERROR)
     write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
+    print_note(application.table.tree.foreign.note())
     if as_json:
         echo(dumps(budget.as_dict()))
     else:

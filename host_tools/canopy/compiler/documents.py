@@ -12,9 +12,14 @@ from canopy.compiler.leaf_model import Declarations, Leaf, read_model
 from canopy.compiler.port_types import Options
 from canopy.compiler.xml_reader import Element, parse_xml
 from canopy.files import FileError, read_bytes
+from canopy.tree.foreign import Foreign
+from canopy.tree.search import Library
 
+MOST_TREES = 20
 UNNAMED = "BehaviorTree"
 ROOT_CHILDREN = ("BehaviorTree", "TreeNodesModel", "include")
+# Attributes that any node and tree may have and that change nothing in a tick.
+PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath", "_trace")
 
 
 @dataclass
@@ -24,7 +29,12 @@ class Documents:
     files: list[Path] = field(default_factory=list)
     trees: dict[str, Element] = field(default_factory=dict)
     main: str = ""
+    top: Element | None = None
+    problems: int = 0
+    """How many errors were left out, where the trees are only drawn."""
     declarations: Declarations = field(default_factory=Declarations)
+    foreign: Foreign = field(default_factory=Foreign)
+    library: Library = field(default_factory=Library)
 
     @cached_property
     def usable_leaves(self) -> dict[str, Leaf]:
@@ -36,7 +46,7 @@ class _Reader:
     def __init__(self, options: Options, built_in: frozenset[str]) -> None:
         self._options = options
         self._built_in = built_in
-        self.documents = Documents()
+        self.documents = Documents(foreign=Foreign(options.foreign), library=Library(options, built_in))
 
     def read(self, path: Path) -> Element:
         """Reads a file and, depth first, what it includes. The files that are open are in `chain`."""
@@ -51,19 +61,38 @@ class _Reader:
                 waiting.pop()
                 chain.popitem()
             elif element.tag == "include":
-                path = self._included(element, file)
+                try:
+                    path = self._included(element, file)
+                except CompileError as error:
+                    self._wrong(error)
+                    continue
                 target = path.resolve()
+                if target in chain and self._options.draw:
+                    continue
                 if target in chain:
                     names = " -> ".join(open_file.name for open_file in (*chain, target))
                     raise CompileError(element.place, f"files include each other in a loop: {names}")
                 if target not in known:
-                    inner = self._read_root(path, element)
-                    waiting.append((iter(inner.children), path))
                     known.add(target)
+                    try:
+                        inner = self._read_root(path, element)
+                    except CompileError as error:
+                        self._wrong(error)
+                        continue
+                    waiting.append((iter(inner.children), path))
                     chain[target] = None
             else:
-                self._take(element)
+                try:
+                    self._take(element)
+                except CompileError as error:
+                    self._wrong(error)
         return top
+
+    def _wrong(self, error: CompileError) -> None:
+        """Raises it; where trees are only drawn, counts it."""
+        if not self._options.draw:
+            raise error
+        self.documents.problems += 1
 
     def _read_root(self, path: Path, included_by: Element | None = None) -> Element:
         try:
@@ -76,17 +105,21 @@ class _Reader:
             raise CompileError(place, message, "paths are relative to this file") from error
         self.documents.files.append(path)
         root = parse_xml(data, str(path))
-        if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
+        # An included file that does not say its format has that of the file that includes it.
+        version = root.attributes.get("BTCPP_format", "4" if included_by is not None else "")
+        is_tree_file = root.tag == "root" and (self._options.draw or version == "4")
+        if not is_tree_file:
             raise CompileError(
                 root.place,
                 'the outer element must be <root BTCPP_format="4">',
-                "a file without it may be one of BehaviorTree.CPP 3, which Groot2 converts",
+                "a file without it may be one of BehaviorTree.CPP 3: canopy fmt --to-4 converts it",
             )
-        root.only("BTCPP_format", "main_tree_to_execute", "project_name")
+        if not self._options.draw:
+            root.only(self.documents.foreign, "BTCPP_format", "main_tree_to_execute", "project_name")
         return root
 
     def _included(self, element: Element, file: Path) -> Path:
-        element.only("path", "ros_pkg")
+        element.only(self.documents.foreign, "path", "ros_pkg")
         if not element.attributes.get("path"):
             raise CompileError(element.place, "<include> needs the attribute path", 'for example path="other.xml"')
         return self._folder(element, file) / element.attributes["path"]
@@ -107,27 +140,27 @@ class _Reader:
 
     def _take(self, element: Element) -> None:
         if element.tag == "BehaviorTree":
-            element.only("ID", "name", "description")
+            element.only(self.documents.foreign, "ID", "description", *PLAIN_ATTRIBUTES)
             # BehaviorTree.CPP accepts a lone tree without an ID; two of them meet here.
             tree_id = element.attributes.get("ID") or UNNAMED
             if tree_id in self.documents.trees:
                 first = f"the other one: {self.documents.trees[tree_id].place}"
                 raise CompileError(element.place, f"<BehaviorTree> needs an ID of its own, not '{tree_id}'", first)
-            if len(element.children) != 1:
+            if len(element.children) != 1 and not (self._options.draw and element.children):
                 raise CompileError(
                     element.place,
                     f"<BehaviorTree ID='{tree_id}'> needs exactly 1 node, and has {len(element.children)}",
                 )
             self.documents.trees[tree_id] = element
         elif element.tag == "TreeNodesModel":
-            read_model(element, self.documents.declarations, self._options, self._built_in)
+            read_model(element, self.documents.declarations, self._options, self._built_in, self.documents.foreign)
         else:
             raise CompileError(
                 element.place, f"<{element.tag}> is not supported here", nearest(element.tag, ROOT_CHILDREN)
             )
 
 
-def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) -> str:
+def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None, draw: bool) -> str:
     if asked is not None:
         if asked not in trees:
             raise CompileError(
@@ -135,7 +168,7 @@ def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) ->
             )
         return asked
     wanted = root.attributes.get("main_tree_to_execute")
-    if wanted is not None:
+    if wanted is not None and (wanted in trees or not draw):
         if wanted not in trees:
             raise CompileError(
                 root.attribute_place("main_tree_to_execute"),
@@ -147,23 +180,53 @@ def _choose_tree(root: Element, trees: dict[str, Element], asked: str | None) ->
     for candidates in (own, list(trees)):
         if len(candidates) == 1:
             return candidates[0]
-    raise CompileError(
-        root.place,
-        "several trees, and no main_tree_to_execute says which",
-        f"say it there, or with --main-tree; {nearest('', trees)}",
-    )
+    if draw:
+        return roots(own or list(trees), trees)[0]
+    raise CompileError(root.place, "several trees, and no main_tree_to_execute says which", main_tree_list(own, trees))
 
 
-def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Documents:
-    """Reads a tree file and all that it includes.
+def roots(names: list[str], trees: dict[str, Element]) -> list[str]:
+    """Those of the trees that no other one has as a SubTree; all, if there are none."""
+    waiting = [trees[name] for name in names]
+    inner = set()
+    while waiting:
+        element = waiting.pop()
+        waiting.extend(element.children)
+        if element.tag == "SubTree":
+            inner.add(element.attributes.get("ID"))
+    return [name for name in names if name not in inner] or names
+
+
+def main_tree_list(own: list[str], trees: dict[str, Element]) -> str:
+    """A help text that lists the trees which the main one can be: first those that are no part of another."""
+    names = own or list(trees)
+    first = roots(names, trees)
+    shown = [f"--main-tree {name} (line {trees[name].place.line})" for name in first[:MOST_TREES]]
+    more = f" and {len(first) - MOST_TREES} more" if len(first) > MOST_TREES else ""
+    parts = f"; {len(names) - len(first)} more are parts of these" if len(names) > len(first) else ""
+    return f"say it there, or choose one: {', '.join(shown)}{more}{parts}"
+
+
+def read_files(path: Path, options: Options, built_in: frozenset[str]) -> Documents:
+    """Reads a file and all that it includes. It may hold no tree, or several without a main one.
 
     Raises:
         CompileError: a file cannot be read, is no tree file, or includes itself.
     """
     reader = _Reader(options, built_in)
-    root = reader.read(path)
-    documents = reader.documents
+    reader.documents.top = reader.read(path)
+    return reader.documents
+
+
+def read_documents(path: Path, options: Options, built_in: frozenset[str]) -> Documents:
+    """Reads a tree file and all that it includes, and chooses the main tree.
+
+    Raises:
+        CompileError: a file cannot be read, is no tree file, or includes itself, or no tree is the main one.
+    """
+    documents = read_files(path, options, built_in)
+    assert documents.top is not None
     if not documents.trees:
-        raise CompileError(Place(root.place.file, 1, 1), "no <BehaviorTree> in this file")
-    documents.main = _choose_tree(root, documents.trees, options.main_tree)
+        raise CompileError(Place(documents.top.place.file, 1, 1), "no <BehaviorTree> in this file")
+    documents.main = _choose_tree(documents.top, documents.trees, options.main_tree, options.draw)
     return documents

@@ -17,7 +17,7 @@ from canopy import __version__
 from canopy.compiler import codec
 from canopy.compiler.binding import bind
 from canopy.compiler.bounds import Others
-from canopy.compiler.budget import Budget, make_budget, trace_capacity
+from canopy.compiler.budget import Budget, make_budget
 from canopy.compiler.bus_reader import Bus, read_bus
 from canopy.compiler.bus_timing import frame_us, frames_in
 from canopy.compiler.dbc_file import read_dbc
@@ -28,9 +28,12 @@ from canopy.compiler.image_room import exchangeable, image_cost, make_room
 from canopy.compiler.layout import layout
 from canopy.compiler.leaf_c import (
     arguments,
+    entry_kind,
     entry_note,
+    entry_step,
     entry_type,
     function_names,
+    has_setter,
     item_type,
     parameters,
     port_members,
@@ -44,6 +47,7 @@ from canopy.compiler.limits import FRAMES, whole
 from canopy.compiler.names import is_c_identifier, snake
 from canopy.compiler.port_types import Options, PortType
 from canopy.compiler.row_c import place_constant, row_fields
+from canopy.compiler.script.arithmetic import RANK
 from canopy.compiler.script.compile import Texts
 from canopy.compiler.script_bodies import initial_lines
 from canopy.compiler.table import Table, make_table
@@ -53,6 +57,8 @@ from canopy.compiler.tree_reader import read_tree
 from canopy.escape import c_templates
 from canopy.escape.c import header, string
 from canopy.escape.json_text import dumps
+from canopy.tree.enums import constants
+from canopy.tree.generic import VALUE
 
 MODEL_FORMAT = 2
 
@@ -88,8 +94,8 @@ class Application:
 
     @property
     def trace_capacity(self) -> int:
-        """Trace frames that can wait: those of one tick, rounded up to a power of two."""
-        return trace_capacity(self.trace)
+        """Trace frames that can wait: a power of two."""
+        return self.trace.capacity if self.trace is not None else 1
 
 
 def _check_leaves(table: Table, bus: Bus) -> None:
@@ -218,6 +224,14 @@ def _queues(table: Table) -> list[PortType]:
     return sorted({kind for kind in kinds if kind.capacity}, key=lambda kind: kind.c)
 
 
+def _ranks(table: Table) -> list[int]:
+    """The place of each text in the order of all; none where no script asks for it."""
+    if not any(f"{RANK}(" in line for script in table.tree.scripts for line in script.body):
+        return []
+    order = sorted(table.bindings.texts, key=str.encode)
+    return [order.index(text) for text in table.bindings.texts]
+
+
 def _short(place: Place) -> str:
     """`get_home.xml:12`, for comments."""
     return f"{os.path.basename(place.file)}:{place.line}"
@@ -247,8 +261,11 @@ def environment(bus: Bus) -> jinja2.Environment:
         "function_names_of": function_names,
         "port_members": port_members,
         "setter": setter,
+        "has_setter": has_setter,
         "entry_type": entry_type,
         "entry_note": entry_note,
+        "entry_kind": entry_kind,
+        "entry_step": entry_step,
         "item_type": item_type,
         "text_constants": text_constants,
         "reason_constants": reason_constants,
@@ -283,8 +300,11 @@ def render(application: Application) -> dict[str, bytes]:
         "bus": application.bus,
         "entries": bindings.entries,
         "texts": bindings.texts,
+        "enums": constants(application.name, application.table.tree.enums),
+        "ranks": _ranks(application.table),
         "notes": application.table.parameter_notes(),
         "queues": _queues(application.table),
+        "has_values": any(p.type == VALUE for use in application.table.users for p in use.leaf.ports),
         "image": application.images,
         "trace": application.trace,
         "starts": [line for entry in bindings.entries for line in initial_lines(entry, texts)],

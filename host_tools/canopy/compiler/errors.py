@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from canopy.escape.visible import brief
@@ -36,6 +36,47 @@ class CompileError(Exception):
     def __str__(self) -> str:
         text = f"{brief(str(self.place))}: error: {brief(self.message)}"
         return f"{text}\n  help: {brief(self.help_text)}" if self.help_text else text
+
+
+MOST_ERRORS = 20
+
+
+class CombinedError(CompileError):
+    """Several errors of one input; the first one's place and message are its own."""
+
+    def __init__(self, errors: Sequence[CompileError]) -> None:
+        super().__init__(errors[0].place, errors[0].message, errors[0].help_text)
+        self.errors = tuple(errors)
+
+    def __str__(self) -> str:
+        shown = [str(error) for error in self.errors[:MOST_ERRORS]]
+        more = len(self.errors) - MOST_ERRORS
+        return "\n".join([*shown, f"and {more} more errors"] if more > 0 else shown)
+
+
+class Errors:
+    """Collects what is wrong, so that one run names it all: each error once, in the order in which they were met."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Place, str], CompileError] = {}
+
+    def add(self, error: CompileError) -> None:
+        """One more; its own ones, if it is several."""
+        for one in error.errors if isinstance(error, CombinedError) else (error,):
+            self._found.setdefault((one.place, one.message), one)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def raise_any(self) -> None:
+        """Ends the step.
+
+        Raises:
+            CompileError: all that was collected.
+        """
+        found = list(self._found.values())
+        if found:
+            raise found[0] if len(found) == 1 else CombinedError(found)
 
 
 class UnsupportedTypeError(CompileError):

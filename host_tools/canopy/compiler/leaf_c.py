@@ -10,7 +10,7 @@ from canopy.compiler.bus_reader import Bus
 from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.names import snake
 from canopy.compiler.numbers import plain
-from canopy.compiler.port_types import PortType
+from canopy.compiler.port_types import NOTHING, PortType
 from canopy.escape.c import emits_c, mark_c
 
 TREE_PARAMETERS = "canopy_tree_instance_t *tree, uint16_t node"
@@ -110,6 +110,10 @@ def port_members(leaf: Leaf, port: Port, counted: set[tuple[str, str]]) -> list[
     if not port.writes:
         c_type = f"const {port.type.c} *" if port.type.kind == "user" else port.type.c
         return [(mark_c(f"{_spaced(c_type)}{port.c_name};"), " ".join(notes))]
+    if port.type == NOTHING:
+        return [
+            (mark_c(f"void *{port.c_name};"), " ".join([*notes, "Nothing is connected to it, and it has no type."]))
+        ]
     notes.append(f"Written with {leaf.c_name}_set_{port.c_name}().")
     members = [(mark_c(f"{_stored(port.type)} *{port.c_name};"), " ".join(notes))]
     if (leaf.id, port.name) in counted:
@@ -127,6 +131,11 @@ def setter(leaf: Leaf, port: Port) -> tuple[str, str]:
     if port.type.kind == "user":
         return f"const {port.type.c} *value", "*value"
     return f"{port.type.c} value", "value"
+
+
+def has_setter(port: Port) -> bool:
+    """Can the node write it?"""
+    return port.writes and port.type != NOTHING
 
 
 def _stored(kind: PortType) -> str:
@@ -162,3 +171,17 @@ def entry_note(entry: Entry) -> str:
     if entry.type.kind == "fixed":
         return f"; in steps of {plain(entry.type.scale)}"
     return "; place in the table of texts" if entry.type.kind == "text" else ""
+
+
+@emits_c
+def entry_kind(entry: Entry) -> str:
+    """How a host program in the same process reads the entry's member: `kind` of canopy_in_process_entry_t."""
+    kind = entry.type.kind
+    if kind in ("int", "fixed", "duration"):
+        return "i" if entry.type.low < 0 else "u"
+    return {"bool": "b", "float": "f", "text": "t"}.get(kind, "o") if not entry.type.capacity else "o"
+
+
+def entry_step(entry: Entry) -> str:
+    """The physical size of one step of the member, as a decimal number."""
+    return str(plain(entry.type.scale)) if entry.type.kind == "fixed" else "1"

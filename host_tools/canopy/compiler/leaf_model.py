@@ -14,27 +14,33 @@ FAILURE, the default, or SUCCESS), `state` (a C type of the user's: the node's o
 write to its output ports of texts, separated by semicolons: texts are constants), `reasons` (of a Condition or Action:
 why it returns what it returns, names of the user's separated by semicolons; the trace tells them).
 
-<Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree.
+<Control> and <Decorator> declare inner nodes of the user's own, <SubTree> the ports of a tree, <Enum> a type
+(canopy.tree.enums).
 
 Metadata that only `canopy check` and `canopy fmt --simplify` use (docs/lint.md, docs/tools.md), and that changes no
 generated code: `returns` (the statuses that the leaf can return, if fewer than its kind allows), `undoes` and
 `achieves` (IDs of leaves: the action that this one cleans up after, the condition that it makes true), `moves` (signals
 that its acting changes), `safeguards` (signals that it keeps in their safe range), `hysteresis` (what keeps a
 condition's threshold from chattering), `holds` (the comparison of a signal with a number that a condition is).
+
+Metadata of other tools is left alone (canopy.tree.foreign).
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 from canopy.compiler.errors import CompileError, Place, UnsupportedTypeError, nearest
 from canopy.compiler.limits import PORTS_MAX, REASONS_MAX
 from canopy.compiler.names import is_c_identifier, snake
-from canopy.compiler.port_types import Options, PortType, read_type
+from canopy.compiler.port_types import Options, PortType, is_optional, read_type
 from canopy.compiler.xml_reader import Element
+from canopy.tree.built_in import is_built_in
+from canopy.tree.enums import add_enum
+from canopy.tree.foreign import Foreign
 
 METADATA = (
     "reasons",
@@ -65,6 +71,7 @@ PORT_TAGS: dict[str, Literal["in", "out", "inout"]] = {
     "bidirectional_port": "inout",  # the name in older models
 }
 MODEL_TAGS = ("Action", "Condition", "Control", "Decorator", "SubTree")
+ENUM_TAG = "Enum"
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ class Port:
     description: str
     place: Place = field(compare=False)
     direction: Literal["in", "out", "inout"] = "in"
-    capacity: int = 0
+    is_optional: bool = False
 
     @cached_property
     def c_name(self) -> str:
@@ -115,6 +122,8 @@ class Leaf:
     holds: str = ""
     safeguards: tuple[str, ...] = ()
     problem: UnsupportedTypeError | None = field(default=None, compare=False)
+    is_guessed: bool = False
+    """No file declares it: it is what its use lets guess."""
 
     @cached_property
     def c_name(self) -> str:
@@ -140,6 +149,7 @@ class Declarations:
     c_names: dict[str, Leaf] = field(default_factory=dict)
     """The same leaves, by their C names."""
     subtrees: dict[str, tuple[Port, ...]] = field(default_factory=dict)
+    enums: dict[str, PortType] = field(default_factory=dict)
 
 
 @dataclass
@@ -150,8 +160,8 @@ class _Draft:
     problem: UnsupportedTypeError | None = None
 
 
-def _read_port(element: Element, options: Options) -> Port:
-    element.only("name", "type", "default", "description")
+def _read_port(element: Element, options: Options, foreign: Foreign) -> Port:
+    element.only(foreign, "name", "type", "default", "description")
     name = element.attributes.get("name", "")
     if not is_c_identifier(snake(name)) or not name:
         raise CompileError(element.place, f"<{element.tag}> needs a name that can be a C identifier, not '{name}'")
@@ -166,19 +176,20 @@ def _read_port(element: Element, options: Options) -> Port:
         element.text.strip(),
         element.place,
         PORT_TAGS[element.tag],
+        is_optional(element.attributes.get("type", "")),
     )
 
 
-def _read_metadata(element: Element, draft: _Draft) -> None:
+def _read_metadata(element: Element, draft: _Draft, foreign: Foreign) -> None:
     for entry in element.children:
         if entry.tag != "Metadata":
-            raise CompileError(
-                entry.place, f"<{entry.tag}> inside <MetadataFields>", "only <Metadata key=…/> goes there"
-            )
+            foreign.leave(entry.tag, entry.place, "element", ("Metadata",))
+            continue
         for key, value in entry.attributes.items():
-            if key not in METADATA:
-                raise CompileError(entry.place, f"unknown metadata '{key}'", nearest(key, METADATA))
-            draft.metadata[key] = (value, entry.place)
+            if key in METADATA:
+                draft.metadata[key] = (value, entry.place)
+            else:
+                foreign.leave(key, entry.attribute_place(key), "metadata", METADATA)
 
 
 def _one_of(draft: _Draft, key: str, allowed: tuple[str, ...], default: str) -> str:
@@ -232,12 +243,12 @@ def _returns(draft: _Draft, kind: str) -> tuple[str, ...]:
     return _words(draft, "returns")
 
 
-def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
+def _read_draft(element: Element, leaf_id: str, options: Options, foreign: Foreign) -> _Draft:
     draft = _Draft()
     for child in element.children:
         if child.tag in PORT_TAGS:
             try:
-                port = _read_port(child, options)
+                port = _read_port(child, options, foreign)
             except UnsupportedTypeError as error:
                 draft.problem = draft.problem or error
                 continue
@@ -248,7 +259,7 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
             if len(draft.ports) > PORTS_MAX:
                 raise CompileError(child.place, f"'{leaf_id}' has more than {PORTS_MAX} ports")
         elif child.tag == "MetadataFields":
-            _read_metadata(child, draft)
+            _read_metadata(child, draft, foreign)
         elif child.tag != "description":
             raise CompileError(
                 child.place,
@@ -258,9 +269,9 @@ def _read_draft(element: Element, leaf_id: str, options: Options) -> _Draft:
     return draft
 
 
-def _read_leaf(element: Element, options: Options) -> Leaf:
+def _read_leaf(element: Element, options: Options, foreign: Foreign) -> Leaf:
     leaf_id = element.attributes["ID"]
-    draft = _read_draft(element, leaf_id, options)
+    draft = _read_draft(element, leaf_id, options, foreign)
     if element.tag == "Condition":
         kind = _one_of(draft, "kind", ("Condition",), "Condition")
         if "writes" in draft.metadata:
@@ -300,34 +311,56 @@ def _read_leaf(element: Element, options: Options) -> Leaf:
     )
 
 
-def read_model(model: Element, into: Declarations, options: Options, built_in: frozenset[str]) -> None:
+def _check_attributes(element: Element, foreign: Foreign) -> None:
+    for name in element.attributes:
+        if name in METADATA and name not in foreign.allowed:
+            raise CompileError(
+                element.attribute_place(name),
+                f"<{element.tag}> has no attribute '{name}'",
+                f'it is metadata: <MetadataFields><Metadata {name}="…"/></MetadataFields> inside',
+            )
+    element.only(foreign, "ID", "name", "editable", "description")
+
+
+def read_model(
+    model: Element, into: Declarations, options: Options, built_in: frozenset[str], foreign: Foreign | None = None
+) -> None:
     """Adds what a <TreeNodesModel> declares. The same declaration in several files is accepted.
 
     Raises:
         CompileError: a declaration is incomplete, not supported, or contradicts another one.
     """
+    foreign = foreign or Foreign(options.foreign)
     seen: set[str] = set()
     for element in model.children:
+        if element.tag == ENUM_TAG:
+            add_enum(element, into.enums, foreign)
+    options = replace(options, enums=into.enums)
+    for element in model.children:
+        if element.tag == ENUM_TAG:
+            continue
+        if element.tag not in MODEL_TAGS and "ID" not in element.attributes:
+            foreign.leave(element.tag, element.place, "element", (*MODEL_TAGS, ENUM_TAG))
+            continue
         if element.tag not in MODEL_TAGS:
             raise CompileError(
-                element.place, f"<{element.tag}> in <TreeNodesModel> is not supported", nearest(element.tag, MODEL_TAGS)
+                element.place,
+                f"<{element.tag}> in <TreeNodesModel> is not supported",
+                nearest(element.tag, (*MODEL_TAGS, ENUM_TAG)),
             )
         node_id = element.attributes.get("ID", "")
         if not node_id:
             raise CompileError(element.place, f"<{element.tag}> in <TreeNodesModel> needs an ID")
-        element.only("ID", "name", "editable", "description")
+        _check_attributes(element, foreign)
         if element.tag == "SubTree":
-            draft = _read_draft(element, node_id, options)
+            draft = _read_draft(element, node_id, options, foreign)
             if draft.problem is not None:
                 raise draft.problem
             into.subtrees[node_id] = tuple(draft.ports)
             continue
-        if node_id in built_in:
-            # Groot2 saves the models of built-in nodes too; what they are is not for the file to say.
-            if "MetadataFields" in (child.tag for child in element.children):
-                raise CompileError(element.place, f"'{node_id}' is the name of a built-in node", "choose another ID")
+        if node_id in built_in and is_built_in(element, METADATA):
             continue
-        leaf = _read_leaf(element, options)
+        leaf = _read_leaf(element, options, foreign)
         same = into.c_names.setdefault(leaf.c_name, leaf)
         if same is not leaf and (same != leaf or leaf.id in seen):
             raise CompileError(

@@ -42,6 +42,8 @@ RAW = Limits(-(2**63), 2**64 - 1)
 FRAMES = Limits(1, 2**32 - 1)
 """canopy_app_t.rx_max: frames that the bus can carry in a period."""
 BITRATE = Limits(1_000, 100_000_000, "bit/s")
+TRACE_TICKS = Limits(1, 1_000, "ticks")
+"""canopy_app_t.trace_ticks."""
 
 PORTS_MAX = 1_000
 """Of one node type: a member of a struct each, in three places."""

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from canopy.compiler.errors import CompileError, Place
 from canopy.escape import make
-from canopy.escape.terminal import echo_lines
+from canopy.escape.terminal import echo, echo_lines
 from canopy.files import FileError, write_files
 
 INPUT_ERROR = 2
@@ -20,6 +20,12 @@ def fail(error: CompileError) -> NoReturn:
     """Prints the error, and ends the program with exit status 2."""
     echo_lines(str(error), err=True)
     sys.exit(INPUT_ERROR)
+
+
+def print_note(note: str) -> None:
+    """Prints a note to standard error; nothing when it is empty."""
+    if note:
+        echo(note, err=True)
 
 
 def dependencies(depfile: Path, target: Path, read: list[Path]) -> dict[Path, bytes]:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.bus_reader import Bus
 from canopy.compiler.limits import count
@@ -10,9 +12,10 @@ from canopy.compiler.port_types import TEXT, literal
 from canopy.compiler.script.compile import FAULTS, Compiler, Texts, guess
 from canopy.compiler.script.storing import stripped
 from canopy.compiler.script.syntax import Assignment, Expression, ScriptError
-from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value
+from canopy.compiler.script.values import Const, Num, TextConst, TextVar, Value, boolean
 from canopy.compiler.tree import Script
 from canopy.escape.c import emits_c
+from canopy.tree.lists import items_of, queue_literal
 
 
 def entry_value(script: Script) -> Entry | SignalName | str:
@@ -26,6 +29,11 @@ def _cases(script: Script) -> int:
     return sum(name.startswith("case_") for name in script.element.attributes)
 
 
+def _is_number(text: str, number: Const) -> bool:
+    value = guess(text)
+    return isinstance(value, Const) and not value.is_bool and not number.is_bool and value.value == number.value
+
+
 class Bodies:
     """Compiles scripts. `indices`: the place of each node (by its id()) in the node table."""
 
@@ -34,6 +42,7 @@ class Bodies:
         self._texts = texts
         self._floats = floats
         self._indices = indices
+        self.all_texts_are_known = False
 
     def body(self, script: Script, statements: tuple[Expression, ...]) -> tuple[str, ...]:
         """The lines of the function, without its head."""
@@ -73,10 +82,13 @@ class Bodies:
             lines += compiler.statement(last)
             last = last.target
         truth = compiler.truth(last)
+        lines += compiler.first()
         return [*lines, f"return {int(truth.value)};" if isinstance(truth, Const) else f"return {stripped(truth.c)};"]
 
     def _value(self, compiler: Compiler, script: Script, text: str, own_name: str) -> Value:
         name = pointer(text, own_name)
+        if name is None and text in script.scope.board.enums:
+            return Const(Fraction(script.scope.board.enums[text]))
         return guess(text) if name is None else compiler.named(name, 0)
 
     def _switch(self, compiler: Compiler, script: Script) -> list[str]:
@@ -88,7 +100,7 @@ class Bodies:
             case = self._value(compiler, script, text, attribute)
             if isinstance(value, TextVar) or (isinstance(value, Num) and value.choices and isinstance(case, TextConst)):
                 case = TextConst(text) if pointer(text, attribute) is None else case
-            answer = compiler.compare_values("==", value, case)
+            answer = self._matches(compiler, value, case)
             if isinstance(answer, Const):
                 if answer.value:
                     return [*lines, f"return {place};"]
@@ -96,16 +108,25 @@ class Bodies:
             lines += [f"if {answer.c if answer.c.startswith('(') else f'({answer.c})'} {{", f"    return {place};", "}"]
         return [*lines, f"return {_cases(script)};"]
 
+    def _matches(self, compiler: Compiler, value: Value, case: Value) -> Num | Const:
+        """Equal; of texts also those that are the same number, as in BehaviorTree.CPP: 5 and 5.0."""
+        answer = compiler.compare_values("==", value, case)
+        number = guess(case.text) if isinstance(case, TextConst) else None
+        if not isinstance(value, TextVar) or not isinstance(number, Const) or not self.all_texts_are_known:
+            return answer
+        places = [place for place, text in enumerate(self._texts.all) if _is_number(text, number)]
+        return boolean(f"({' || '.join(f'{value.c} == {place}u' for place in places)})") if places else answer
+
     def _take(self, compiler: Compiler, script: Script) -> list[str]:
         assert isinstance(script.target, Entry)
         assert script.type is not None
-        if script.queue is not None:
+        if script.queue is not None and not script.queue.is_constant:
             return self._take_from_entry(compiler, script, script.queue, script.target)
         assert script.state is not None
         place = script.place()
-        texts = [text.strip() for text in script.text.split(";") if text.strip()]
+        texts = items_of(script.text if script.queue is None else script.queue.initial or "")
         if not texts:
-            raise ScriptError(0, "the list is empty", 'for example queue="1;2;3"')
+            return ["return 0; /* the list is empty */"]
         count(texts, "items of the list", place)
         if script.type == TEXT:
             items, c_type = [f"{self._texts.index(text)}u" for text in texts], "uint16_t"
@@ -183,6 +204,10 @@ def initial_lines(entry: Entry, texts: Texts) -> list[str]:
     if entry.initial is not None and entry.type == TEXT:
         return [f"{member} = {texts.index(entry.initial)}u;"]
     if entry.initial is not None:
+        if entry.type.item:
+            where = f"entry {entry.name!r}"
+            c = queue_literal(entry.initial, entry.type, where, entry.place, texts)
+            return [f"{member} = ({entry.type.c}){{{c}}};"]
         return [f"{member} = {literal(entry.initial, entry.type, f'entry {entry.name!r}', entry.place)};"]
     if entry.type.kind == "user":
         return [f"memset(&{member}, 0, sizeof {member});"]

@@ -166,14 +166,16 @@ def _loop(context: Context, element: Element, scope: Scope, xml_name: str) -> No
             "<LoopDouble> is floating point, which this application does not allow",
             "use LoopInt with a smaller unit, or compile with --allow-floating-point",
         )
-    script = context.script("take", element, "queue", scope)
+    if "queue" not in element.attributes:
+        raise CompileError(element.place, f"<{xml_name}> needs the attribute queue", 'for example queue="1;2;3"')
+    script = Script("take", element, "queue", scope)  # it may be empty: a loop over nothing
+    context.scripts.append(script)
     script.type = kind
     script.target = context.entry(element, "value", scope, f"<{xml_name} value>", writes=True, kind=kind)
     node = _node("Loop", xml_name, element, (script, _status(element, "if_empty", "SUCCESS")))
     script.node = node
     if pointer(script.text, "queue") is not None:
         script.queue = context.entry(element, "queue", scope, f"<{xml_name} queue>", writes=False, kind=ANY)
-        return node
     script.state = context.board.make(f"next item at line {element.place.line}", scope.path, element.place)
     script.state.connect(Use(PORT_TYPES["uint16_t"], element.place, f"<{xml_name}>", True))
     return node

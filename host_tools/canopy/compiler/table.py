@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 
-from canopy.compiler.binding import Bindings, BoundPort
+from canopy.compiler.bound_ports import Bindings, BoundPort
 from canopy.compiler.leaf_model import Leaf
 from canopy.compiler.limits import count
 from canopy.compiler.tree import Node, Script, Tree

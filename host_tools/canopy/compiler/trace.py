@@ -21,6 +21,10 @@ CHANGES_MAX = 8
 """Most CanopyChange frames of a tick; five nodes each, at best."""
 VALUES_MAX = 3
 """Most CanopyValue frames of a tick: CANOPY_TRACE_VALUES_MAX is 7."""
+TICKS_DEFAULT = 4
+"""Ticks whose trace can wait while the bus lets nothing through."""
+CHANGES_WAITING = 2
+"""CanopyChange and CanopyValue frames of each of them but one, which may be a full one."""
 SLOTS_MAX = 4096
 KNOWN_MS = 2000
 """All nodes, and all values, are told once in this time, if one frame in each tick is enough for it."""
@@ -55,6 +59,7 @@ class TraceOptions:
     guard: int | None = None
     """E2E data id of CanopyTick; None: not guarded."""
     entries: Entries = "all"
+    ticks: int = TICKS_DEFAULT
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,7 @@ class Trace:
     base: int
     extended: bool
     guard: int | None
+    ticks: int
     changes_max: int
     values_max: int
     snapshot_every: int
@@ -127,13 +133,24 @@ class Trace:
         """Most trace frames of one tick: six of one kind each (two of CanopyModel), and what varies."""
         return 6 + self.arrivals_max + self.changes_max + self.values_max
 
+    @property
+    def capacity(self) -> int:
+        """Frames that can wait: those of a full tick, and of ticks - 1 in which little changes; a power of two."""
+        frames = self.frames_max + (self.ticks - 1) * (2 + self._usual_arrivals + CHANGES_WAITING)
+        return 1 << (frames - 1).bit_length()
+
+    @property
+    def _usual_arrivals(self) -> int:
+        """CanopyArrivals frames of a tick that takes a young frame of every message."""
+        return -(-max(0, self.messages - AGES_IN_INPUTS) // AGES_IN_FRAME)
+
     def frames_a_second(self, period_ms: int, *, worst: bool) -> float:
         """Frames on the bus. `worst`: all that can change changes in every tick; else nothing does.
 
         Without, the frames of arrivals are those of a tick that takes a young frame of every message.
         """
-        arrivals = -(-max(0, self.messages - AGES_IN_INPUTS) // AGES_IN_FRAME)
-        in_tick = (2 + self.arrivals_max + self.changes_max + self.values_max) if worst else 2 + arrivals
+        varying = self.arrivals_max + self.changes_max + self.values_max if worst else self._usual_arrivals
+        in_tick = 2 + varying
         slow = 1 / self.snapshot_every + 1 / self.health_every + 2 / self.model_every
         if self.values and not worst:
             slow += 1 / self.values_every
@@ -151,6 +168,7 @@ class Trace:
             "base": self.base,
             "extended": self.extended,
             "guard": self.guard,
+            "ticks": self.ticks,
             "changes_max": self.changes_max,
             "values_max": self.values_max,
             "snapshot_every": self.snapshot_every,
@@ -266,6 +284,7 @@ def make_trace(table: Table, bus: Bus, period_ms: int, options: TraceOptions) ->
         base=options.base,
         extended=extended,
         guard=options.guard,
+        ticks=options.ticks,
         changes_max=min(CHANGES_MAX, len(table.rows)),
         values_max=VALUES_MAX if slots else 0,
         snapshot_every=snapshot_every,

@@ -13,6 +13,7 @@ from canopy.compiler.leaf_model import Leaf, Port
 from canopy.compiler.node_types import NodeType
 from canopy.compiler.port_types import PortType
 from canopy.compiler.xml_reader import Element
+from canopy.tree.foreign import Foreign
 
 # What a script is for, and so what it returns:
 #   condition  the value of its last expression; 0 while a signal in it is stale
@@ -86,7 +87,8 @@ class Node:
 class Tree:
     """A checked tree: its ID, the files it came from (the main one first), the root, and what its names stand for.
 
-    `used`: the IDs of the trees that it is made of; `unused`: the main file's others, by ID.
+    `used`: the IDs of the trees that it is made of; `unused`: the main file's others, by ID; `foreign`: what of other
+    tools its files hold.
     """
 
     id: str
@@ -98,3 +100,9 @@ class Tree:
     scripts: tuple[Script, ...] = ()
     used: frozenset[str] = frozenset()
     unused: dict[str, Element] = field(default_factory=dict)
+    enums: dict[str, PortType] = field(default_factory=dict)
+    problems: int = 0
+    """How many errors were left out, where a tree is only drawn."""
+    others: tuple[str, ...] = ()
+    """The other trees that can be the main one, where a tree is only drawn and the file does not say."""
+    foreign: Foreign = field(default_factory=Foreign)

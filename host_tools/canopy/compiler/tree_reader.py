@@ -6,19 +6,29 @@ A <SubTree> costs no node: the root of its tree stands in its place, with a scop
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from canopy.compiler.blackboard import Blackboard, Entry, Scope, Use, pointer
-from canopy.compiler.documents import Documents, read_documents
-from canopy.compiler.errors import CompileError, nearest
+from canopy.compiler.documents import PLAIN_ATTRIBUTES, Documents, read_documents, roots
+from canopy.compiler.errors import CompileError, Errors, nearest
 from canopy.compiler.leaf_model import Leaf, Port
-from canopy.compiler.node_types import NodeType, Parameter, node_types
-from canopy.compiler.port_types import ANY, Options
+from canopy.compiler.node_types import NodeType, node_types
+from canopy.compiler.port_types import Options
 from canopy.compiler.scripted import POSTCONDITIONS, PRECONDITIONS, SCRIPTED, Context, attributes_node
-from canopy.compiler.tree import Bound, Node, Script, Tree
+from canopy.compiler.tree import Bound, Node, Tree
 from canopy.compiler.xml_reader import Element
+from canopy.tree.built_in import CANOPY_ONLY, built_in_models, foreign_attribute, is_users
+from canopy.tree.enums import names_of
+from canopy.tree.instance import Instance
+from canopy.tree.model_file import declare_guessed
+from canopy.tree.node_id import id_of
+from canopy.tree.parameters import read_parameter
+from canopy.tree.ports import bind_port, dotted_names, is_traced
+from canopy.tree.search import complete
+from canopy.tree.undeclared import Unknown, stand_in
 
 __all__ = ["MAX_NODES", "Node", "Tree", "built_in_types", "read_tree", "read_unused_trees"]
 
@@ -26,8 +36,6 @@ MAX_NODES = 65_534
 MAX_SUBTREE_DEPTH = 1_000
 MAX_PATH = 4_000
 
-# Attributes that any node may have and that change nothing in a tick.
-PLAIN_ATTRIBUTES = ("name", "_uid", "_description", "_fullpath", "_trace")
 CONDITION_ATTRIBUTES = (*PRECONDITIONS, *POSTCONDITIONS)
 
 # Kinds of the user's own nodes: their names in XML are those of the nodes.
@@ -41,11 +49,6 @@ NOT_SUPPORTED = frozenset(("ManualSelector",))
 
 EXPLICIT = {"Action": "LEAF", "Condition": "LEAF", "Control": "CONTROL", "Decorator": "DECORATOR"}
 
-# Least value of a parameter; the others may be any 32-bit number.
-LEAST = {"num_attempts": -1, "num_cycles": -1, "msec": 0, "delay_msec": 0, "then_skip": 0}
-# Parameters that are a number of children: 1 to N, or -1 (all) down to -N.
-THRESHOLDS = ("success_count", "failure_count", "max_failures")
-
 
 def built_in_types() -> dict[str, NodeType]:
     """The node types that XML can name and that have no script."""
@@ -53,37 +56,34 @@ def built_in_types() -> dict[str, NodeType]:
     return {name: kind for name, kind in node_types().items() if name not in hidden}
 
 
-def _built_in_names() -> frozenset[str]:
+def built_in_names() -> frozenset[str]:
+    """What a declaration cannot be called, but for the names that only Canopy has."""
     return frozenset((*built_in_types(), *SCRIPTED, *NOT_SUPPORTED, "SubTree", *EXPLICIT))
-
-
-@dataclass
-class _Instance:
-    """One instance of a tree: its scope, its path for the host tools, and the tree IDs that led to it."""
-
-    scope: Scope
-    path: str
-    chain: tuple[str, ...]
-    names: dict[str, int] = field(default_factory=dict)
-
-    def unique(self, name: str) -> str:
-        """`name`, with `::2` and so on from the second use in this instance on."""
-        self.names[name] = self.names.get(name, 0) + 1
-        return name if self.names[name] == 1 else f"{name}::{self.names[name]}"
 
 
 class _Builder:
     def __init__(self, documents: Documents, options: Options) -> None:
+        self._documents = documents
+        self._library = documents.library
         self._trees = documents.trees
         self._models = documents.declarations
+        self._foreign = documents.foreign
         self._built_in = built_in_types()
         self.context = Context(options, Blackboard())
+        self._known = {*self._built_in, *SCRIPTED, *NOT_SUPPORTED, ""} - {*CANOPY_ONLY}
+        self._unknown = Unknown()
+        self._sources = documents.files
+        self.errors = Errors()
         self.count = 0
         self.used: set[str] = set()
 
     def build(self, tree_id: str) -> Node:
         """The whole tree. A loop, not recursion: trees may be as deep as they are large."""
-        main = _Instance(self.context.board.main, tree_id, (tree_id,))
+        with contextlib.suppress(CompileError):  # what is wrong is said where it is used
+            complete(self._documents, built_in_names(), tree_id)
+        self.context.board.dotted = dotted_names(self._documents)
+        self.context.board.enums = names_of(self._models.enums)
+        main = Instance(self.context.board.main, tree_id, (tree_id,))
         self.used.add(tree_id)
         self._main_ports(main.scope, tree_id)
         root, inner, element, instance = self._expand(self._trees[tree_id].children[0], main)
@@ -95,7 +95,13 @@ class _Builder:
                 node.children.append(outer)
                 if inner_element.children:
                     waiting.append((inner, inner_element, inner_instance))
-            self._check_handler(node)
+            try:
+                self._check_handler(node)
+            except CompileError as error:
+                self.errors.add(error)
+        self._unknown.report(self.errors, self._sources)
+        if not self.context.options.draw:
+            self.errors.raise_any()
         return root
 
     @staticmethod
@@ -111,19 +117,23 @@ class _Builder:
 
     def _main_ports(self, scope: Scope, tree_id: str) -> None:
         """The ports of the main tree are what the program itself writes and reads."""
+        self._library.add_ports(tree_id, self._trees[tree_id], self._documents)
         for port in self._models.subtrees.get(tree_id, ()):
-            entry = scope.resolve(port.name, port.place)
+            inner = pointer(port.default or "", port.name)
+            entry = scope.resolve(inner or port.name, port.place)
+            scope.names.setdefault(port.name, entry)
             if isinstance(entry, Entry):
-                entry.initial = port.default
+                entry.initial = port.default if inner is None else None
                 entry.connect(Use(port.type, port.place, f"port '{port.name}' of the main tree", True))
 
     def _counted(self, node: Node) -> Node:
         self.count += 1
         if self.count > MAX_NODES:
-            raise CompileError(node.place, f"the tree has more than {MAX_NODES} nodes")
+            self.errors.add(CompileError(node.place, f"the tree has more than {MAX_NODES} nodes"))
+            self.errors.raise_any()
         return node
 
-    def _expand(self, element: Element, instance: _Instance) -> tuple[Node, Node, Element, _Instance]:
+    def _expand(self, element: Element, instance: Instance) -> tuple[Node, Node, Element, Instance]:
         """The node of an element, below the nodes of its attributes; for a SubTree, the root of its tree.
 
         Gives the outermost node, and the innermost one with its element and instance.
@@ -131,9 +141,18 @@ class _Builder:
         outermost: Node | None = None
         above: Node | None = None
         while True:
-            attributes = attributes_node(self.context, element, instance.scope)
-            is_subtree = element.tag == "SubTree"
-            node = None if is_subtree else self._make(element, instance)
+            attributes: Node | None = None
+            node: Node | None = None
+            inner: Instance | None = None
+            try:
+                attributes = attributes_node(self.context, element, instance.scope)
+                if element.tag == "SubTree":
+                    inner = self._enter(element, instance)
+                else:
+                    node = self._make(element, instance)
+            except CompileError as error:  # go on without it, to find what else is wrong
+                self.errors.add(error)
+                node = stand_in(element)
             for new in (attributes, node):
                 if new is None:
                     continue
@@ -143,19 +162,22 @@ class _Builder:
                     above.children.append(new)
                 outermost = outermost or new
                 above = new
-            if node is not None:
-                assert outermost is not None
+            if inner is None:
+                assert outermost is not None and node is not None
                 return outermost, node, element, instance
-            instance = self._enter(element, instance)
+            instance = inner
             element = self._trees[instance.chain[-1]].children[0]
 
-    def _enter(self, element: Element, outer: _Instance) -> _Instance:
+    def _enter(self, element: Element, outer: Instance) -> Instance:
         """A new instance of the tree that a <SubTree> names."""
         tree_id = element.attributes.get("ID", "")
-        if tree_id not in self._trees:
+        if tree_id not in self._trees and not self._library.add_tree(tree_id, element, self._documents):
             raise CompileError(
-                element.attribute_place("ID"), f"<SubTree> names no tree: '{tree_id}'", nearest(tree_id, self._trees)
+                element.attribute_place("ID"),
+                f"<SubTree> names no tree: '{tree_id}'",
+                f"{nearest(tree_id, self._trees)}; the folder of a file that has it: --search DIR",
             )
+        self._library.add_ports(tree_id, element, self._documents)
         if tree_id in outer.chain:
             loop = " -> ".join((*outer.chain[outer.chain.index(tree_id) :], tree_id))
             raise CompileError(element.place, f"trees contain each other in a cycle: {loop}", "a tree has an end")
@@ -175,7 +197,7 @@ class _Builder:
             )
         scope = Scope(self.context.board, path, outer.scope, autoremap=autoremap.lower() in ("true", "1"))
         self._connect(element, scope, tree_id)
-        return _Instance(scope, f"{outer.path}/{name}", (*outer.chain, tree_id))
+        return Instance(scope, f"{outer.path}/{name}", (*outer.chain, tree_id))
 
     def _connect(self, element: Element, scope: Scope, tree_id: str) -> None:
         plain = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, "ID", "_autoremap"}
@@ -184,9 +206,8 @@ class _Builder:
             if name in plain:
                 continue
             if name.startswith("_"):
-                raise CompileError(
-                    element.attribute_place(name), f"<SubTree> has no attribute '{name}'", nearest(name, plain)
-                )
+                self._foreign.leave(name, element.attribute_place(name), "<SubTree>", plain)
+                continue
             if not name.isidentifier():
                 raise CompileError(element.attribute_place(name), f"'{name}' cannot be the name of a port")
             scope.connect(name, text, element.attribute_place(name))
@@ -204,15 +225,25 @@ class _Builder:
             if isinstance(target, Entry):
                 target.connect(Use(port.type, port.place, f"port '{port.name}' of tree '{tree_id}'", False))
 
-    def _make(self, element: Element, instance: _Instance) -> Node:
-        node_id = element.attributes.get("ID", "") if element.tag in EXPLICIT else element.tag
-        if node_id in SCRIPTED:
+    def _make(self, element: Element, instance: Instance) -> Node:
+        node_id = id_of(element)
+        if node_id not in self._known:
+            self._library.add_model(node_id, element, self._documents)
+        if node_id in self._models.leaves:  # first: the user's node may have the name of one that only Canopy has
+            node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
+        elif is_users(element, node_id):
+            wrong = foreign_attribute(element, node_id) or ""
+            known = [port.name for port in built_in_models()[node_id][1]]
+            raise CompileError(
+                element.attribute_place(wrong),
+                f"<{node_id}> has no attribute '{wrong}'",
+                f"{nearest(wrong, known)}; if it is a node of your own, canopy model {self._sources[0]} declares it",
+            )
+        elif node_id in SCRIPTED:
             node = SCRIPTED[node_id](self.context, element, instance.scope, node_id)
             self._check_plain(element)
         elif node_id in self._built_in:
             node = self._built_in_node(element, self._built_in[node_id], instance.scope)
-        elif node_id in self._models.leaves:
-            node = self._leaf_node(element, self._models.leaves[node_id], instance.scope)
         elif node_id in NOT_SUPPORTED:
             raise CompileError(
                 element.place, f"<{node_id}> is not supported", "declare a node of your own in its place"
@@ -220,9 +251,11 @@ class _Builder:
         elif element.tag in EXPLICIT and not node_id:
             raise CompileError(element.place, f"<{element.tag}> needs the attribute ID")
         else:
-            known = [*self._models.leaves, *self._built_in, *SCRIPTED]
-            hint = f'it is a tree: <SubTree ID="{node_id}"/>' if node_id in self._trees else nearest(node_id, known)
-            raise CompileError(element.place, f"unknown node '{node_id}'", hint)
+            if node_id in self._trees:
+                message = f"unknown node '{node_id}'"
+                raise CompileError(element.place, message, f'it is a tree: <SubTree ID="{node_id}"/>')
+            self._unknown.add(node_id, element.place, (*self._models.leaves, *self._known, *CANOPY_ONLY))
+            return stand_in(element)
         wanted = EXPLICIT.get(element.tag)
         is_condition = node.type.name == "Condition"
         if wanted is not None and (
@@ -244,109 +277,44 @@ class _Builder:
         return node
 
     def _check_plain(self, element: Element) -> None:
+        """Looks at the attributes that begin with `_`: those of other tools are left alone."""
         allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES}
         for name in element.attributes:
             if name.startswith("_") and name not in allowed:
-                raise CompileError(
-                    element.attribute_place(name), f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed)
-                )
+                self._foreign.leave(name, element.attribute_place(name), f"<{element.tag}>", allowed)
 
     def _check_attributes(self, element: Element, own: set[str]) -> None:
         allowed = {*PLAIN_ATTRIBUTES, *CONDITION_ATTRIBUTES, *own} | ({"ID"} if element.tag in EXPLICIT else set())
         for name in element.attributes:
-            if name not in allowed:
+            if name not in allowed and not name.startswith("_"):
                 raise CompileError(element.place, f"<{element.tag}> has no attribute '{name}'", nearest(name, allowed))
+        self._check_plain(element)
 
     def _leaf_node(self, element: Element, leaf: Leaf, scope: Scope) -> Node:
         if leaf.problem is not None:
             raise leaf.problem
         self._check_attributes(element, {port.name for port in leaf.ports})
-        bound = tuple(self._bind(element, leaf, port, scope) for port in leaf.ports)
-        if self._is_traced(element):
+        bound = tuple(self._bind_or_not(element, leaf, port, scope) for port in leaf.ports)
+        if is_traced(element):
             for port in bound:
                 if isinstance(port.target, Entry):
                     port.target.is_traced = True
         name = element.attributes.get("name", leaf.id)
         return Node(node_types()[leaf.kind], name, element.place, leaf=leaf, bound=bound, xml_name=leaf.id)
 
-    @staticmethod
-    def _is_traced(element: Element) -> bool:
-        text = element.attributes.get("_trace", "no")
-        if text not in ("yes", "no"):
-            raise CompileError(element.attribute_place("_trace"), f"_trace='{text}' is neither yes nor no")
-        return text == "yes"
-
-    def _bind(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
-        # Groot2 writes an empty attribute for a port that nothing is connected to.
-        given = port.name in element.attributes and (element.attributes[port.name] != "" or port.type.kind == "text")
-        text = element.attributes[port.name] if given else port.default
-        place = element.attribute_place(port.name) if given else element.place
-        if text is None:
-            if port.direction == "out" or self.context.options.unset_ports:
-                return Bound(port, place)
-            raise CompileError(
-                element.place,
-                f"'{leaf.id}' needs a value for its port '{port.name}'",
-                f"or give the port a default where it is declared: {port.place}; or take 0, false or NULL for all such "
-                "ports: --allow-unset-ports",
-            )
-        name = pointer(text, port.name)
-        if name is None:
-            if port.writes:
-                raise CompileError(
-                    place,
-                    f"port '{port.name}' of '{leaf.id}' is written, and '{text}' is a literal",
-                    "give an entry: {name}",
-                )
-            return Bound(port, place, text=text)
-        target = scope.resolve(name, place)
-        if isinstance(target, Entry):
-            target.connect(Use(port.type, place, f"port '{port.name}' of '{leaf.id}'", port.writes))
-        elif port.writes:
-            raise CompileError(place, f"port '{port.name}' of '{leaf.id}' is written, and '{name}' is a signal")
-        return Bound(port, place, target=target)
+    def _bind_or_not(self, element: Element, leaf: Leaf, port: Port, scope: Scope) -> Bound:
+        try:
+            return bind_port(self.context, element, leaf, port, scope)
+        except CompileError as error:
+            self.errors.add(error)
+            return Bound(port, element.place)
 
     def _built_in_node(self, element: Element, kind: NodeType, scope: Scope) -> Node:
         own = {parameter.name for parameter in kind.parameters}
         self._check_attributes(element, own)
-        parameters = tuple(self._parameter(element, parameter, scope) for parameter in kind.parameters)
+        parameters = tuple(read_parameter(self.context, element, each, scope) for each in kind.parameters)
         name = element.attributes.get("name", kind.name)
         return Node(kind, name, element.place, parameters, xml_name=kind.name)
-
-    def _parameter(self, element: Element, parameter: Parameter, scope: Scope) -> int | Script:
-        name = parameter.name
-        text = element.attributes.get(name, parameter.default)
-        if not text:
-            raise CompileError(element.place, f"<{element.tag}> needs the attribute {name}", f'for example {name}="3"')
-        if pointer(text, name) is not None:
-            return self._entry_parameter(element, name, scope)
-        if text in ("true", "false"):
-            text = "1" if text == "true" else "0"
-        try:
-            value = int(text)
-        except ValueError:
-            raise CompileError(element.place, f"{name}='{text}' is not a whole number") from None
-        least = LEAST.get(name, -(2**31))
-        if not least <= value < 2**31:
-            raise CompileError(element.place, f"{name}={value} is outside [{least}, {2**31 - 1}]")
-        count = len(element.children)
-        if name in THRESHOLDS and not (1 <= value <= count or -count <= value <= -1):
-            raise CompileError(
-                element.place,
-                f"{name}={value} can never be met by {count} children, or needs none",
-                f"1 to {count}, or -1 (all) down to -{count}",
-            )
-        return value
-
-    def _entry_parameter(self, element: Element, name: str, scope: Scope) -> Script:
-        script = self.context.script("parameter", element, name, scope)
-        inner = pointer(script.text, name)
-        assert inner is not None
-        script.target = scope.resolve(inner, script.place())
-        script.least = LEAST.get(name, -(2**31))
-        if isinstance(script.target, Entry):
-            script.target.connect(Use(ANY, script.place(), f"<{element.tag} {name}>", False))
-        return script
 
 
 def read_tree(path: Path, options: Options | None = None) -> Tree:
@@ -356,15 +324,26 @@ def read_tree(path: Path, options: Options | None = None) -> Tree:
         CompileError: anything in the file, or in those it includes, that cannot be compiled.
     """
     options = options or Options()
-    documents = read_documents(path, options, _built_in_names())
+    documents = read_documents(path, options, built_in_names())
+    if options.undeclared:
+        declare_guessed(documents, options, built_in_names())
     tree = _expand(path, documents, _Builder(documents, options), documents.main)
     own = {name: element for name, element in documents.trees.items() if element.place.file == str(path)}
-    return replace(tree, unused={name: element for name, element in own.items() if name not in tree.used})
+    first = roots(list(own), documents.trees) if options.draw and options.main_tree is None else []
+    if documents.top is not None and documents.top.attributes.get("main_tree_to_execute") in documents.trees:
+        first = []
+    return replace(
+        tree,
+        others=tuple(name for name in first if name != tree.id),
+        unused={name: element for name, element in own.items() if name not in tree.used},
+    )
 
 
 def read_unused_trees(path: Path, options: Options, tree: Tree) -> Iterator[tuple[str, Tree | CompileError]]:
     """The file's trees that are no part of its main tree: each that is no part of another one, or why it cannot be."""
-    documents = read_documents(path, options, _built_in_names())
+    documents = read_documents(path, options, built_in_names())
+    if options.undeclared:
+        declare_guessed(documents, options, built_in_names())
     inner = {ref for element in tree.unused.values() for ref in _subtrees(element)}
     seen: set[str] = set()
     nodes = 0
@@ -407,4 +386,7 @@ def _expand(path: Path, documents: Documents, builder: _Builder, tree_id: str) -
         board=builder.context.board,
         scripts=tuple(builder.context.scripts),
         used=frozenset(builder.used),
+        enums=documents.declarations.enums,
+        problems=len(builder.errors) + documents.problems,
+        foreign=documents.foreign,
     )

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from canopy.compiler.errors import CompileError, Place, nearest
+from canopy.compiler.errors import CompileError, Place
 from canopy.files import FileError, read_bytes
+from canopy.tree import raw_markup
+from canopy.tree.foreign import Foreign
 
 MAX_DEPTH = 65_534
 
@@ -32,12 +34,15 @@ class Element:
     _values: dict[bytes, tuple[int, int]] | None = field(default=None, repr=False)
     _characters: dict[str, list[int]] = field(default_factory=dict, repr=False)
     """Where each character of an attribute begins: scripts ask for many."""
+    _begins: dict[str, Place] = field(default_factory=dict, repr=False)
 
     def attribute_place(self, name: str, index: int = 0) -> Place:
         """The place of character `index` of an attribute's value; the tag's place when the value cannot be found.
 
         Expat gives no places of attributes, so the tag is read again; `&lt;` and the like are one character.
         """
+        if not index and name in self._begins:
+            return self._begins[name]
         if self._values is None:
             self._values = self._read_again()
         start, end = self._values.get(name.encode(), (0, 0))
@@ -48,18 +53,20 @@ class Element:
                 self._characters[name] = [match.start() for match in _CHARACTER.finditer(self.source, start, end)]
             starts = self._characters[name]
             start = starts[index] if index < len(starts) else end
-        return self._place_of(start)
+        place = self._place_of(start)
+        if not index:
+            self._begins[name] = place
+        return place
 
-    def only(self, *known: str) -> None:
-        """Refuses an attribute that is not known; not those of other namespaces, and what editors keep (`_…`).
+    def only(self, foreign: Foreign, *known: str) -> None:
+        """Looks at attributes that are not known: those of other namespaces are nobody's, others are `foreign`.
 
         Raises:
-            CompileError: with the attribute's place, and the nearest name.
+            CompileError: one looks like a known one, misspelt.
         """
         for name in self.attributes:
-            if name not in known and ":" not in name and not name.startswith(("_", "xmlns")):
-                place = self.attribute_place(name)
-                raise CompileError(place, f"<{self.tag}> has no attribute '{name}'", nearest(name, known))
+            if name not in known and ":" not in name and name != "xmlns":
+                foreign.leave(name, self.attribute_place(name), f"<{self.tag}>", known)
 
     def _read_again(self) -> dict[bytes, tuple[int, int]]:
         """Where each attribute's value begins and ends."""
@@ -87,6 +94,24 @@ def unreadable_encoding(file: str, error: Exception) -> CompileError:
     """For what expat raises when it does not know the encoding in the XML declaration."""
     return CompileError(
         Place(file, 1, 1), f"the encoding that the file names cannot be read: {error}", "save it as UTF-8"
+    )
+
+
+def malformed(data: bytes, file: str, error: expat.ExpatError) -> CompileError:
+    """For what expat raises; a raw & or < of a script is named, with what to write."""
+    for offset, raw in raw_markup.find(data):
+        line = data.count(b"\n", 0, offset) + 1
+        start = data.rfind(b"\n", 0, offset) + 1
+        if line > error.lineno:
+            break
+        written = raw_markup.WRITTEN[raw].decode()
+        return CompileError(
+            Place(file, line, len(data[start:offset].decode("utf-8", errors="replace")) + 1),
+            f"not well-formed XML: a raw '{raw.decode()}'",
+            f"in XML it is written {written}; canopy fmt --repair FILE mends all of them",
+        )
+    return CompileError(
+        Place(file, error.lineno, error.offset + 1), f"not well-formed XML: {expat.ErrorString(error.code)}"
     )
 
 
@@ -134,8 +159,7 @@ class _Builder:
         try:
             self._parser.Parse(data, True)
         except expat.ExpatError as error:
-            place = Place(self._file, error.lineno, error.offset + 1)
-            raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+            raise malformed(data, self._file, error) from error
         except (LookupError, ValueError) as error:
             raise unreadable_encoding(self._file, error) from error
         assert self._root is not None  # expat refuses a document without an element

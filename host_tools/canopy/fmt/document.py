@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.xml_reader import unreadable_encoding
+from canopy.compiler.xml_reader import MAX_DEPTH, malformed, unreadable_encoding
 from canopy.files import LARGEST
-
-MAX_DEPTH = 5_000
 
 
 @dataclass
@@ -35,6 +33,7 @@ class Element:
     tag: str
     attributes: list[tuple[str, str]]
     children: list[Content] = field(default_factory=list)
+    line: int = 0
 
 
 Content = Element | Text | Markup
@@ -82,6 +81,7 @@ class _Reader:
             place = Place(self._file, self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1)
             raise CompileError(place, f"elements are nested more than {MAX_DEPTH} deep")
         element = Element(tag, list(zip(attributes[::2], attributes[1::2], strict=True)))
+        element.line = self.parser.CurrentLineNumber
         self._open[-1].append(element)
         self._open.append(element.children)
 
@@ -115,7 +115,7 @@ def read_document(data: bytes, file: str) -> Document:
     """Reads a file's bytes.
 
     Raises:
-        CompileError: not well-formed XML, a DOCTYPE, too large, or nested too deep to be indented.
+        CompileError: not well-formed XML, a DOCTYPE, too large, or nested too deep.
     """
     if len(data) > LARGEST:
         raise CompileError(Place(file), f"the file has {len(data)} bytes; at most {LARGEST} are read")
@@ -123,8 +123,7 @@ def read_document(data: bytes, file: str) -> Document:
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
-        place = Place(file, error.lineno, error.offset + 1)
-        raise CompileError(place, f"not well-formed XML: {expat.ErrorString(error.code)}") from error
+        raise malformed(data, file, error) from error
     except (LookupError, ValueError) as error:
         raise unreadable_encoding(file, error) from error
     return reader.document

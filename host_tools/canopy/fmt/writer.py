@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The canonical form.
 
-Two blanks a level, one element a line; attributes on the tag's line if that has at most 120 characters, else one a
-line; double quotes; `<Node/>` when there is nothing inside; single blank lines between elements stay, more become one;
-comments keep their text, and their place behind an element. Text is never touched, nor anything beside it. UTF-8, LF,
-newline at the end. A loop, not recursion: trees may be as deep as they are large.
+Two blanks a level, up to 100 levels, one element a line; attributes on the tag's line if that has at most 120
+characters, else one a line; double quotes; `<Node/>` when there is nothing inside; single blank lines between elements
+stay, more become one; comments keep their text, and their place behind an element. Text is never touched, nor anything
+beside it. UTF-8, LF, newline at the end. A loop, not recursion: trees may be as deep as they are large.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from canopy.fmt.document import Content, Document, Element, Text
 
 WIDTH = 120
 INDENT = "  "
+DEEPEST = 100
+"""Deeper levels are indented as this one: the file grows with the tree, and not with its depth."""
 
 _IN_TEXT = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
 _IN_ATTRIBUTE = str.maketrans(
@@ -117,7 +119,8 @@ class _Writer:
                 self.parts.append(_tag(content, indent, ">") + _verbatim(content).partition(">")[2])
             else:
                 self.parts.append(_tag(content, indent, ">"))
-                stack.append((list(reversed(content.children)), indent + INDENT, f"</{content.tag}>"))
+                deeper = indent + INDENT if len(indent) < DEEPEST * len(INDENT) else indent
+                stack.append((list(reversed(content.children)), deeper, f"</{content.tag}>"))
                 first = True
 
 

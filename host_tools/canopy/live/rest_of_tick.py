@@ -5,15 +5,13 @@ from __future__ import annotations
 
 from canopy.model import Model
 
-_PERIODS = 4  # CANOPY_TRACE_PERIODS: later none of its frames leaves
-
 
 class RestOfTick:
     """Tell it of each frame, with the time of a monotonic clock [s]."""
 
     def __init__(self, model: Model) -> None:
         self._tick_id = model.trace.ids["CanopyTick"]
-        self._wait = _PERIODS * model.period_us / 1e6
+        self._wait = model.trace.waits_periods * model.period_us / 1e6
         self._begun: float | None = None
 
     def saw(self, identifier: int, now: float) -> None:

@@ -82,6 +82,8 @@ class Trace:
     """29-bit ids."""
     guard: int | None
     """E2E data id of CanopyTick; None: it is not protected."""
+    ticks: int
+    """Ticks whose trace has room while the bus lets nothing through."""
     changes_max: int
     """Most CanopyChange frames in a tick."""
     known_within_ms: int
@@ -89,6 +91,11 @@ class Trace:
     values: tuple[TraceValue, ...]
     texts: tuple[str, ...]
     """What the values of the type text stand for."""
+
+    @property
+    def waits_periods(self) -> int:
+        """Periods after its tick in which a frame can still leave: CANOPY_TRACE_PERIODS, and those that there is room for."""
+        return 4 + self.ticks
 
     @cached_property
     def ids(self) -> dict[str, int]:

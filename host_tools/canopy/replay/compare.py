@@ -17,16 +17,13 @@ import can
 from canopy.replay import e2e
 from canopy.replay.align import Alignment, Lacking, Replayed, Rules, Same, align, not_counted
 from canopy.replay.explain import explain
-from canopy.replay.log import AHEAD, COUNTED_MAX, NEEDED, Bus, Run, Sent, key
+from canopy.replay.log import COUNTED_MAX, NEEDED, Bus, Run, Sent, key
 
 _OVERRUNS, _PROTECTED_OVERRUNS = bytes([*[0] * 7, 0xC0]), bytes([0xFF, *[0] * 6, 0xC0])
 _NO_COUNTS = bytes([0, *[0xFF] * 7])
 _HEALTH = {0: bytes([0x10, 0, 0, *[0xFF] * 5]), 4: bytes([0, 0, 0, 0xFF, 0xFF, 0, 0, 0xFF])}
 """Bits that follow from clock, driver and bus, not from the inputs. Of CanopyTick Overruns, and the CRC over them; of
 CanopyHealth all but RxRejected in page 0, LeafFaults and Timeouts in page 4."""
-_COUNTED_AFTER = AHEAD + 1
-"""Ticks from the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
-of a tick leaves, all commands of the tick have left or were counted."""
 _LAST = 1 << 62
 """In the order of the replay's frames: behind all."""
 
@@ -136,9 +133,10 @@ class Comparison:
 
     def _align(self, number: int, replayed: Sequence[Replayed]) -> Alignment:
         may_lack = 0 if self._is_needed(number) else max((count for _, count in self._counted), default=0)
-        ahead = 0 if number in self._bus.trace else AHEAD
+        ahead = 0 if number in self._bus.trace else self._bus.ahead
         # Behind the last CanopyHealth nothing counts what is lacking.
-        whole = min(self._whole, self._counted[-1][0] - _COUNTED_AFTER) if self._counted else self._whole
+        counted_after = self._bus.ahead + 1
+        whole = min(self._whole, self._counted[-1][0] - counted_after) if self._counted else self._whole
         rules = Rules(ahead, may_lack, self._whole if self._is_needed(number) else whole, self._same(number))
         recorded = self._run.sent.get(number, [])
         found = (align(recorded[start:], replayed, rules) for start in self._starts(number, recorded))
@@ -171,7 +169,7 @@ class Comparison:
                 continue
             for what in explain(self._bus, number, sent.data, frame.data):
                 self._differ(frame.tick, frame.order, name, what, sent.place)
-        ahead = 0 if number in self._bus.trace else AHEAD
+        ahead = 0 if number in self._bus.trace else self._bus.ahead
         for sent in alignment.extra:
             if sent.tick + ahead < done:  # else it may be of a tick that is not compared
                 self._differ(sent.tick, _LAST, name, ("frame", sent.data.hex(" "), "none"), sent.place)
@@ -210,8 +208,11 @@ class Comparison:
         if self._is_needed(number):
             return []
         following = {frame.order: later.tick for frame, later in pairwise(replayed)}
+        # From the next value of a command until CanopyHealth has counted the value that it has replaced: when the trace
+        # of a tick leaves, all commands of the tick have left or were counted.
+        counted_after = self._bus.ahead + 1
         return [
-            Lacking(number, frame, following.get(frame.order, self._ticks) + _COUNTED_AFTER)
+            Lacking(number, frame, following.get(frame.order, self._ticks) + counted_after)
             for frame in alignment.lacking
             if frame.tick < self._whole
         ]

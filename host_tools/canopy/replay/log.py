@@ -37,8 +37,6 @@ NEEDED = ("CanopyTick", "CanopyInputs", "CanopyArrivals")
 """Trace messages without which nothing can be replayed."""
 COUNTED_MAX = 3 * 0xFFFF
 """Stands for any number of frames that never left, from this one on."""
-AHEAD = 5
-"""A command may be so many ticks ahead of its CanopyTick: a trace frame waits CANOPY_TRACE_PERIODS for the bus, 4."""
 SUFFIXES = (".log", ".asc", ".blf")
 
 
@@ -65,6 +63,8 @@ class Bus:
         """
         database = load_database(model)
         self.model = model
+        self.ahead = model.trace.waits_periods + 1
+        """A command may be so many ticks ahead of its CanopyTick."""
         self.received: dict[int, DbcMessage] = {}
         self.sent: dict[int, DbcMessage] = {}
         """Commands and trace."""
@@ -111,7 +111,7 @@ class Sent:
 
     place: int
     tick: int
-    """Of a trace frame its tick. Of a command that of the CanopyTick behind it: its own tick, or one up to AHEAD
+    """Of a trace frame its tick. Of a command that of the CanopyTick behind it: its own tick, or one up to Bus.ahead
     before it, for commands overtake the trace."""
     data: bytes
 
@@ -275,8 +275,8 @@ class _Reader:
         commands: dict[int, list[tuple[int, int, bytes]]] = {}
         for command in self._commands:
             commands.setdefault(command[0], []).append(command)
-        run.doubtful = {number: len(frames[-AHEAD:]) - 1 for number, frames in commands.items()}
-        self._commands = sorted(command for frames in commands.values() for command in frames[-AHEAD:])
+        run.doubtful = {number: len(frames[-self._bus.ahead :]) - 1 for number, frames in commands.items()}
+        self._commands = sorted(command for frames in commands.values() for command in frames[-self._bus.ahead :])
 
     def _follow(self, kind: str, place: int, data: bytes) -> None:
         """Notes what is missing; where a whole tick is, the next CanopyTick or CanopyInputs shows it."""

@@ -8,26 +8,16 @@ from pathlib import Path
 
 import click
 
-from canopy.compiler.cli import main_tree_option, package_option, read_packages
+from canopy.compiler.cli import main_tree_option, package_option, read_packages, read_search, search_option
 from canopy.compiler.errors import CompileError, Place
-from canopy.compiler.output import fail
+from canopy.compiler.output import fail, print_note
 from canopy.compiler.port_types import ANY_TYPE
-from canopy.compiler.tree_reader import Tree, read_tree
+from canopy.compiler.tree_reader import read_tree
 from canopy.escape.terminal import echo_lines
 from canopy.files import FileError, write_files
 from canopy.show.dot import dot
-from canopy.show.order import in_order
 from canopy.show.svg import svg
 from canopy.show.terminal import print_tree
-
-MOST_CELLS = 10_000_000
-
-
-def _check_size(tree: Tree) -> None:
-    """A drawing has a column for each level, and takes time and room for each node in it."""
-    cells = sum(depth for _, _, depth in in_order(tree.root))
-    if cells > MOST_CELLS:
-        raise CompileError(tree.root.place, "the tree is too deep to be drawn", "draw a part of it: --main-tree")
 
 
 def _write(target: str, text: str) -> None:
@@ -47,6 +37,7 @@ def _write(target: str, text: str) -> None:
 @click.option("--svg", "svg_file", metavar="FILE", help="Draw it as SVG into FILE; - is standard output.")
 @click.option("--dot", "dot_file", metavar="FILE", help="Write it in Graphviz's DOT into FILE; - is standard output.")
 @package_option
+@search_option
 @main_tree_option
 def command(
     tree: Path,
@@ -60,6 +51,9 @@ def command(
     → Sequence, ? Fallback, ⇉ Parallel, * with memory (BehaviorTree.CPP's Sequence and Fallback have one, the Reactive
     ones not), δ decorator, (condition), [action].
 
+    Any tree is drawn, also of older formats: nodes that no file declares as what they seem to be, and what would not
+    compile as far as it can be. Without a main tree all trees of the file are drawn that are no part of another one.
+
     \b
     Examples:
       canopy show trees/get_home.xml
@@ -67,13 +61,22 @@ def command(
       canopy show trees/get_home.xml --dot - | dot -Tpdf > get_home.pdf
     """
     try:
-        checked = read_tree(tree, replace(ANY_TYPE, ros_packages=read_packages(packages), main_tree=main_tree))
-        _check_size(checked)
+        options = replace(ANY_TYPE, ros_packages=read_packages(packages), search=read_search(), draw=True)
+        drawn = [read_tree(tree, replace(options, main_tree=main_tree))]
+        if svg_file is None and dot_file is None:
+            drawn += [read_tree(tree, replace(options, main_tree=other)) for other in drawn[0].others]
     except CompileError as error:
         fail(error)
     if svg_file is not None:
-        _write(svg_file, svg(checked))
+        _write(svg_file, svg(drawn[0]))
     if dot_file is not None:
-        _write(dot_file, dot(checked))
+        _write(dot_file, dot(drawn[0]))
     if svg_file is None and dot_file is None:
-        print_tree(checked)
+        for one in drawn:
+            print_tree(one)
+    elif drawn[0].others:
+        print_note(f"note: '{drawn[0].id}' is drawn; for another tree: --main-tree {' or '.join(drawn[0].others)}")
+    problems = max(one.problems for one in drawn)
+    if problems:
+        things = "1 thing" if problems == 1 else f"{problems} things"
+        print_note(f"note: {things} would not compile; canopy compile says which")

@@ -28,28 +28,53 @@ class Box:
     children: list[Box] = field(default_factory=list)
 
 
-# Left and right end of a subtree on each level, the deepest level first.
-_Outline = list[tuple[float, float]]
+@dataclass
+class _Outline:
+    """Left and right end of a subtree on each level, the deepest level first; `shift` is added to all of them.
+
+    Moving it costs nothing, and joining two costs as many steps as the flatter one has levels: trees may be as deep as
+    they are large.
+    """
+
+    ends: list[tuple[float, float]]
+    shift: float = 0.0
+
+    def left(self, level: int) -> float:
+        """Of the level-th level from the top, from 1 on."""
+        return self.ends[-level][0] + self.shift
+
+    def right(self, level: int) -> float:
+        """Likewise."""
+        return self.ends[-level][1] + self.shift
+
+
+def _join(one: _Outline, other: _Outline) -> tuple[_Outline, float]:
+    """`other` beside `one`, as close as they come: the outline of both, and how far `other` was moved."""
+    shared = min(len(one.ends), len(other.ends))
+    moved = max(one.right(level) - other.left(level) for level in range(1, shared + 1)) + GAP_X
+    other.shift += moved
+    longer = one if len(one.ends) > len(other.ends) else other
+    for level in range(1, shared + 1):
+        longer.ends[-level] = (one.left(level) - longer.shift, other.right(level) - longer.shift)
+    return longer, moved
 
 
 def _arrange(box: Box, outlines: list[_Outline]) -> _Outline:
     """Sets the children's x, relative to the box; the outline of the whole, top level last."""
+    half = box.width / 2
     if not box.children:
-        return [(-box.width / 2, box.width / 2)]
+        return _Outline([(-half, half)])
     merged = outlines[0]
     places = [0.0]
     for outline in outlines[1:]:
-        shared = min(len(merged), len(outline))
-        shift = max(merged[-level][1] - outline[-level][0] for level in range(1, shared + 1)) + GAP_X
-        places.append(shift)
-        moved = [(left + shift, right + shift) for left, right in outline]
-        both = [(merged[-level][0], moved[-level][1]) for level in range(shared, 0, -1)]
-        longer = merged if len(merged) > len(moved) else moved
-        merged = longer[: len(longer) - shared] + both
+        merged, moved = _join(merged, outline)
+        places.append(moved)
     middle = (places[0] + places[-1]) / 2
     for child, place in zip(box.children, places, strict=True):
         child.x = place - middle
-    return [(left - middle, right - middle) for left, right in merged] + [(-box.width / 2, box.width / 2)]
+    merged.shift -= middle
+    merged.ends.append((-half - merged.shift, half - merged.shift))
+    return merged
 
 
 def place(boxes: list[Box]) -> tuple[float, float]:
@@ -64,7 +89,8 @@ def place(boxes: list[Box]) -> tuple[float, float]:
     tops = [0.0]
     for height in heights:
         tops.append(tops[-1] + height + GAP_Y)
-    boxes[0].x = -min(left for left, _ in outlines[id(boxes[0])])
+    whole = outlines[id(boxes[0])]
+    boxes[0].x = -min(left for left, _ in whole.ends) - whole.shift
     for box in boxes:
         box.y = tops[box.depth]
         for child in box.children:

@@ -11,6 +11,9 @@ from canopy.escape.terminal import styled
 from canopy.show.order import in_order
 from canopy.show.symbols import look
 
+DEEPEST = 60
+"""From here on the level stands in front of a node, in the place of lines that nobody could follow."""
+
 
 def _label(node_text: str, shape: str, leaf: bool) -> str:
     if not leaf:
@@ -23,12 +26,15 @@ def lines(tree: Tree, *, ascii_only: bool = False) -> list[Text]:
     tee, last_tee, bar = ("|-- ", "`-- ", "|   ") if ascii_only else ("├── ", "└── ", "│   ")
     result = [styled(tree.id, style="bold")]
     prefixes = {id(tree.root): ""}
-    for node, parent, _ in in_order(tree.root):
+    for node, parent, depth in in_order(tree.root):
         before = ""
         if parent is not None:
             is_last = parent.children[-1] is node
-            before = prefixes[id(parent)] + (last_tee if is_last else tee)
-            prefixes[id(node)] = prefixes[id(parent)] + ("    " if is_last else bar)
+            if depth > DEEPEST:
+                before = f"{depth} " + (last_tee if is_last else tee)
+            else:
+                before = prefixes[id(parent)] + (last_tee if is_last else tee)
+                prefixes[id(node)] = prefixes[id(parent)] + ("    " if is_last else bar)
         shown = look(node, ascii_only=ascii_only)
         text = _label(shown.text, shown.shape, leaf=not shown.sign)
         label = f"{shown.sign} {text}".strip()

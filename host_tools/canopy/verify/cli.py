@@ -23,6 +23,7 @@ from canopy.verify.certify import certificate
 from canopy.verify.claims import Result
 from canopy.verify.logic import cli as logic
 from canopy.verify.model import Plant, number
+from canopy.verify.record import record
 from canopy.verify.run import Subject, chosen, hand_over, in_arithmetic, load, model_path, recheck, verify
 from canopy.verify.solvers import SOLVERS
 
@@ -133,6 +134,23 @@ def _certify(folder: Path, subject: Subject, result: Result, tree: Path, timeout
         echo(f"         {line}")
 
 
+def _record(folder: Path, subject: Subject, result: Result, period_ms: int, *, quiet: bool) -> None:
+    """Writes what refutes a claim as a record for the program."""
+    assert subject.bus is not None
+    content, rounded = record(result.trace, subject.plant, subject.bus, period_ms)
+    file = folder / f"claim-{result.claim.index + 1:02d}.record"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_files({file: content})
+    except FileError as error:
+        raise CompileError(Place(str(file)), error.problem) from error
+    except OSError as error:
+        raise CompileError(Place(str(file)), f"cannot be written: {error.strerror}") from error
+    if not quiet:
+        note = f", {rounded} of them rounded to the signals' steps" if rounded else ""
+        echo(f"         record {file}: {len(result.trace)} ticks{note}")
+
+
 def _check(folder: Path, tree: Path, model: Path) -> int:
     """Checks every certificate of a folder. Returns the exit status."""
     files = sorted(folder.glob("*.certificate"))
@@ -163,14 +181,14 @@ def _usage(dbc: Path | None, node: str | None, main_tree: str | None, solver: tu
             raise click.UsageError(f"--solver {one} needs a Python package: pip install 'canopy-bt[verify]'")
 
 
-WITH_MODEL = ("model", "names", "arithmetic", "solver", "folder", "checked_folder", "handover")
+WITH_MODEL = ("model", "names", "arithmetic", "solver", "folder", "records", "checked_folder", "handover")
 
 
 def _logic_usage(asked: bool, period: int | None) -> None:
     """Rejects options that do not go with questions about the logic alone, or only with them."""
-    if period is not None and not asked:
-        raise click.UsageError("--period goes with --never or --always")
     context = click.get_current_context()
+    if period is not None and not asked and context.params["records"] is None:
+        raise click.UsageError("--period goes with --never, --always or --record")
     for option in context.command.params if asked else ():
         if option.name in WITH_MODEL and context.params[option.name]:
             raise click.UsageError(f"{option.opts[0]} needs a model: it does not go with --never or --always")
@@ -207,10 +225,13 @@ def _finish(subject: Subject, results: list[Decided], json_: bool) -> None:
     help="Seconds per claim or question.",
 )
 @click.option("--certificate", "folder", type=click.Path(path_type=Path), help="Write certificates to this folder.")
+@click.option("--record", "records", type=click.Path(path_type=Path), help="Write refutations for PROGRAM --replay.")
 @click.option("--check", "checked_folder", type=click.Path(path_type=Path), help="Only check a folder's certificates.")
 @click.option("--never", multiple=True, metavar="FORMULA", help="Without a model: does no tick fulfil this?")
 @click.option("--always", multiple=True, metavar="FORMULA", help="Without a model: does every tick fulfil this?")
-@click.option("--period", type=click.IntRange(1, 3_600_000), help="Of --never, --always: time between ticks [ms].")
+@click.option(
+    "--period", type=click.IntRange(1, 3_600_000), help="Of --never, --always, --record: time between ticks [ms]."
+)
 @click.option("--handover", is_flag=True, help="Also print which leaf hands over to which.")
 @click.option("--trace", "whole", is_flag=True, help="Print every trace, and all of it.")
 @click.option("--json", "json_", is_flag=True, help="Print JSON.")
@@ -230,6 +251,7 @@ def command(
     arithmetic: tuple[str, ...],
     timeout: float,
     folder: Path | None,
+    records: Path | None,
     checked_folder: Path | None,
     never: tuple[str, ...],
     always: tuple[str, ...],
@@ -265,6 +287,8 @@ def command(
     questions = [("--never", one) for one in never] + [("--always", one) for one in always]
     _logic_usage(bool(questions), period)
     _usage(dbc, node, main_tree, solver, folder is not None or checked_folder is not None)
+    if records is not None and (dbc is None or period is None):
+        raise click.UsageError("--record needs --dbc, --node and --period: it writes frames, tick by tick")
     if SIGNALS in arithmetic and dbc is None:
         raise click.UsageError("--arithmetic signals needs --dbc and --node: they have the steps")
     results = []
@@ -288,6 +312,8 @@ def command(
                 _print_rounded(subject.plant, name, one, whole)
             if folder is not None and result.verdict == "proven":
                 _certify(folder, subject, result, tree, timeout, quiet=json_)
+            if records is not None and period is not None and result.verdict == "refuted" and result.trace:
+                _record(records, subject, result, period, quiet=json_)
         if handover and not json_:
             _print_handover(subject)
     except CompileError as error:

@@ -94,8 +94,9 @@ typedef struct {
     canopy_rx_state_t *rx; /**< bus->rx_count. */
     canopy_bus_counters_t counters;
     /** What CanopyInputs tells of the frames taken since the start, so that a replay can take the same ones: */
-    uint32_t taken; /**< How many had the id of a message, refused ones too; modulo 2^32. */
-    uint8_t check;  /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
+    uint32_t taken;    /**< How many had the id of a message, refused ones too; modulo 2^32. */
+    uint8_t check;     /**< canopy_bus_check() over those of a right form, and over each tick's ages and bus state. */
+    uint16_t expected; /**< The message behind the one that came last: the first guess for the next frame. */
 } canopy_bus_state_t;
 
 /**
@@ -119,6 +120,12 @@ void canopy_bus_commit(const canopy_bus_state_t *self, canopy_tx_t *tx, uint32_t
 
 /** Posts every message, due or not, with one deadline. O(messages). */
 void canopy_bus_commit_all(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until);
+
+/**
+ * On the way back after an unusable bus (canopy_tx_owe()): posts the messages that still owe a value, and holds back the
+ * others, so that on a slow bus each gets its turn. O(messages).
+ */
+void canopy_bus_commit_owed(const canopy_bus_state_t *self, canopy_tx_t *tx, canopy_time_t until);
 
 /** Frames refused for any reason but an unknown id; saturates. O(1). */
 uint32_t canopy_bus_rejected(const canopy_bus_counters_t *counters);

@@ -41,10 +41,10 @@ typedef struct {
      * makes it from a controller's timer. Of one to be sent: when it was handed to the driver.
      */
     canopy_time_t time;
-    uint32_t id;    /**< Arbitration id without flags: 0..0x7FF, extended 0..0x1FFFFFFF. */
-    uint8_t flags;  /**< CANOPY_CAN_... */
-    uint8_t length; /**< Bytes of data: 0..8; CAN FD 0..8, 12, 16, 20, 24, 32, 48, 64. */
-    uint8_t data[CANOPY_CAN_DATA_MAX];
+    uint32_t id;                       /**< Arbitration id without flags: 0..0x7FF, extended 0..0x1FFFFFFF. */
+    uint8_t data[CANOPY_CAN_DATA_MAX]; /**< Behind a word, so that a driver can move words. */
+    uint8_t flags;                     /**< CANOPY_CAN_... */
+    uint8_t length;                    /**< Bytes of data: 0..8; CAN FD 0..8, 12, 16, 20, 24, 32, 48, 64. */
 } canopy_can_frame_t;
 
 /** What a driver has lost and seen since it was opened. Counters only grow. */

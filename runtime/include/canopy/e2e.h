@@ -43,7 +43,7 @@ typedef struct {
  * @param data   `length` bytes; byte 0 is not looked at
  * @param length 2..64; not checked
  *
- * O(length), 14 instructions per byte on Cortex-M4 with -O2, 20 with -Os; with a table of 16 bytes in flash.
+ * O(length), 5 instructions per byte on Cortex-M4 with -O2, 6 with -Os, and 12 more; with a table of 256 bytes in flash.
  */
 uint8_t canopy_e2e_crc(uint16_t data_id, const uint8_t *data, uint8_t length);
 

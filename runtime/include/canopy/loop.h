@@ -34,6 +34,7 @@ typedef struct {
     const canopy_can_acceptance_t *acceptance; /**< What it receives: for the driver's filter. */
     uint32_t rx_max;                           /**< Frames that the bus can carry in one period, > 0. */
     uint32_t frame_us;                         /**< How long the bus takes for a frame of 8 bytes [us], > 0. */
+    uint32_t trace_ticks; /**< Ticks whose trace has room in tx_memory: a frame waits so many periods longer. */
     void *memory; /**< The application's one static object; handed to the leaves' functions. The rest lies in it: */
     void (*start)(
         void *memory); /**< First values of entries and of your nodes' state, for canopy_loop_init(); or NULL. */
@@ -60,9 +61,9 @@ typedef enum {
     CANOPY_FAULT_RX_BACKLOG =
         4,                    /**< The second cycle in a row that left frames waiting; detail: cycles with a backlog. */
     CANOPY_FAULT_RX_LOST = 5, /**< The driver has lost received frames; detail: how many since the last cycle. */
-    CANOPY_FAULT_CAN_STATE = 6, /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
-    /** Commands were not out at their deadline, or when a newer value came; detail: how many since the last cycle. */
-    CANOPY_FAULT_TX_EXPIRED = 7
+    CANOPY_FAULT_CAN_STATE = 6,  /**< The state of the bus has changed; detail: the new canopy_can_state_t. */
+    CANOPY_FAULT_TX_EXPIRED = 7, /**< Commands were not out at their deadline; detail: how many since the last cycle. */
+    CANOPY_FAULT_TX_REPLACED = 8 /**< Commands were not out when a newer value came; detail: the same. */
 } canopy_fault_t;
 
 /** What the loop works with. Constant. */
@@ -99,9 +100,10 @@ typedef struct {
     uint32_t rx_backlogs;   /**< Cycles that left frames waiting because of rx_max. */
     uint32_t rx_errors;     /**< Failures of the driver's receive. */
     uint32_t rx_lost;       /**< Frames that the driver has lost, as its counter says. */
-    uint32_t tx_expired;    /**< Commands that were not out at their deadline, or when a newer value came. */
+    uint32_t tx_expired;    /**< Commands that were not out at their deadline. */
+    uint32_t tx_replaced;   /**< Commands that were not out when a newer value came. */
     bool backlog;           /**< The last cycle left frames waiting. */
-    bool returning;         /**< The bus was unusable: safe values go out until they are known to be out. */
+    bool returning;         /**< The bus was unusable: safe values go out until one of each message is out. */
     canopy_can_manager_t can_manager;
     canopy_time_t longest_cycle; /**< [us] */
     canopy_time_t most_late;     /**< Latest start of a cycle after its deadline [us]. */

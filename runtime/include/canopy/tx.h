@@ -59,10 +59,12 @@ typedef struct {
         latest;           /* loop: version << 2 | buffer << 1 | 1 of what was posted last; 0: none, or being written */
     _Atomic uint32_t out; /* service: last version that is out; UINT32_MAX, which is no version: none ever was */
     uint32_t posted;      /* loop: last version */
+    uint32_t owed_after;  /* loop: while it owes, a version after this one must get out */
     uint32_t taken;       /* service: last version that went to a mailbox, or was dropped */
     _Atomic uint8_t reading; /* service: 1 + the buffer that it copies; 0: none */
     uint8_t counter;         /* service: E2E counter of the next frame */
     bool flying;             /* service: in a mailbox */
+    bool owes;               /* loop */
 } canopy_tx_slot_t;
 
 #define CANOPY_TX_TRACE_LENGTH 8u
@@ -111,10 +113,13 @@ typedef struct {
     uint8_t mailbox_count;
     /* The loop's: */
     uint32_t trace_full;         /* frames that found no place */
+    uint32_t held;               /* commands held back */
     _Atomic uint32_t trace_head; /* frames that ever got a place */
     /* The service's: */
     _Atomic uint32_t trace_tail; /* frames that ever left theirs */
+    uint8_t in_flight;           /* frames in mailboxes */
     bool trace_flying;           /* the oldest frame is in a mailbox */
+    _Atomic bool trace_stopped;  /* by the loop: no trace frame leaves any more */
     bool watching;               /* something was handed over, and nothing has got out since */
     _Atomic bool busy;           /* a frame is in a mailbox, or waits because none took it */
     _Atomic bool blocked;
@@ -152,9 +157,33 @@ canopy_error_t canopy_tx_init(canopy_tx_t *self, const canopy_tx_message_t *mess
  */
 void canopy_tx_post(canopy_tx_t *self, uint16_t message, const void *output, canopy_time_t until);
 
+/**
+ * From now on every message owes a value: one that is posted after this call, and gets out. For the way back of a bus on
+ * which nothing got out. Loop's thread. O(messages).
+ */
+void canopy_tx_owe(canopy_tx_t *self);
+
+/** True until a value that a message owes is known to be out. Loop's thread. O(1). */
+bool canopy_tx_owes(canopy_tx_t *self, uint16_t message);
+
+/** A command is held back for others that are owed: it counts as replaced, and uses up no E2E counter. Loop's thread. O(1). */
+void canopy_tx_hold(canopy_tx_t *self);
+
 /** Lets a trace frame wait behind the commands. Loop's thread. One that finds no room is lost and counted. O(1). */
 void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy_tx_trace_data_t *data,
                      canopy_time_t until);
+
+/**
+ * From now on no trace frame leaves: those that wait are dropped and counted by the next service, and so is the one in a
+ * mailbox where the hardware can take it back. canopy_tx_resume_trace() ends that. Loop's thread. O(1).
+ */
+void canopy_tx_stop_trace(canopy_tx_t *self);
+
+/** Trace frames that are posted from now on leave again. Loop's thread. O(1). */
+static inline void canopy_tx_resume_trace(canopy_tx_t *self)
+{
+    atomic_store_explicit(&self->trace_stopped, false, memory_order_relaxed);
+}
 
 /** Sends what was posted, or lets the transmit context do it. Loop's thread, after posting, and as often as it likes. */
 void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
@@ -170,7 +199,10 @@ void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
 void canopy_tx_service(canopy_tx_t *self, canopy_time_t now);
 
 /** True while a frame is in a mailbox, or waits for one, as the service saw it last. Anyone. O(1). */
-bool canopy_tx_is_busy(const canopy_tx_t *self);
+static inline bool canopy_tx_is_busy(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->busy, memory_order_relaxed);
+}
 
 /** True when the last value of every message that was ever posted is known to be out. Loop's thread. O(messages). */
 bool canopy_tx_is_out(const canopy_tx_t *self);
@@ -179,7 +211,10 @@ bool canopy_tx_is_out(const canopy_tx_t *self);
  * True while the bus lets nothing through: a frame is not out at its deadline, and nothing has got out since it was handed
  * to the driver. One that only lost to more urgent ones does not count. Anyone. O(1).
  */
-bool canopy_tx_is_blocked(const canopy_tx_t *self);
+static inline bool canopy_tx_is_blocked(const canopy_tx_t *self)
+{
+    return atomic_load_explicit(&self->blocked, memory_order_relaxed);
+}
 
 /** Copies the counters, which saturate. Loop's thread. O(1). */
 void canopy_tx_count(const canopy_tx_t *self, canopy_tx_counters_t *counters);

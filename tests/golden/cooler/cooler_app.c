@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0xe8c17a7a25e8b1bbu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_APP_H != 0xe8c17a7a25e8b1bbu
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xe8c17a7a25e8b1bbu
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -256,6 +256,7 @@ const canopy_app_t cooler_app = {
     .acceptance = &cooler_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 0u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
@@ -267,5 +268,58 @@ const canopy_app_t cooler_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = COOLER_NODES,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = "target",
+     .type = "int16_t",
+     .step = "1",
+     .size = sizeof memory.entries.target,
+     .address = &memory.entries.target,
+     .kind = 'i'},
+    {.name = "patience",
+     .type = "uint32_t",
+     .step = "1",
+     .size = sizeof memory.entries.patience,
+     .address = &memory.entries.patience,
+     .kind = 'u'},
+    {.name = "tone",
+     .type = "uint16_t",
+     .step = "1",
+     .size = sizeof memory.entries.tone,
+     .address = &memory.entries.tone,
+     .kind = 'u'},
+    {.name = "pauses",
+     .type = "uint32_t",
+     .step = "1",
+     .size = sizeof memory.entries.pauses,
+     .address = &memory.entries.pauses,
+     .kind = 'u'},
+    {.name = "interruptions",
+     .type = "uint32_t",
+     .step = "1",
+     .size = sizeof memory.entries.interruptions,
+     .address = &memory.entries.interruptions,
+     .kind = 'u'},
+    {.name = "hot",
+     .type = "bool",
+     .step = "1",
+     .size = sizeof memory.entries.hot,
+     .address = &memory.entries.hot,
+     .kind = 'b'},
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 6u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif

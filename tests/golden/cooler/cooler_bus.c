@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0xa4aecf69f4c7bfdau
+#if CANOPY_GENERATED_COOLER_BUS_H != 0xe8c17a7a25e8b1bbu
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COOLER_BUS_H
-#define CANOPY_GENERATED_COOLER_BUS_H 0xa4aecf69f4c7bfdau /* of this run */
+#define CANOPY_GENERATED_COOLER_BUS_H 0xe8c17a7a25e8b1bbu /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_APP_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -42,7 +42,7 @@ typedef struct {
     canopy_trace_state_t trace;
     canopy_tx_t tx;
     canopy_tx_slot_t tx_slots[COURIER_TX_MESSAGES];
-    canopy_tx_trace_t tx_trace[16];
+    canopy_tx_trace_t tx_trace[32];
     courier_input_t input;
     courier_output_t output;
     courier_entries_t entries;
@@ -551,6 +551,7 @@ const canopy_app_t courier_app = {
     .acceptance = &courier_acceptance,
     .rx_max = 532u,
     .frame_us = 320u,
+    .trace_ticks = 4u,
     .memory = &memory,
     .start = start,
     .tree_instance = &memory.tree,
@@ -561,9 +562,38 @@ const canopy_app_t courier_app = {
     .output = &memory.output,
     .rx = memory.rx,
     .tx = &memory.tx,
-    .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 16u},
-    .nodes_max = sizeof memory.status,
+    .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 32u},
+    .nodes_max = COURIER_NODES,
     .trace_state = &memory.trace,
     .sent = (uint8_t *)memory.sent,
     .told = NULL,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = "goal",
+     .type = "pose_t",
+     .step = "1",
+     .size = sizeof memory.entries.goal,
+     .address = &memory.entries.goal,
+     .kind = 'o'},
+    {.name = "path",
+     .type = "path_t",
+     .step = "1",
+     .size = sizeof memory.entries.path,
+     .address = &memory.entries.path,
+     .kind = 'o'},
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 2u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif

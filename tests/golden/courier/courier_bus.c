@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0x212ea31854f64dc9u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xe5c033b0d0183f47u
 #error "files of two runs of canopy: generate them again"
 #endif
 

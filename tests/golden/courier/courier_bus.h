@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0x212ea31854f64dc9u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0xe5c033b0d0183f47u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_APP_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -110,6 +110,7 @@ const canopy_app_t room_app = {
     .acceptance = &room_acceptance,
     .rx_max = 1064u,
     .frame_us = 320u,
+    .trace_ticks = 0u,
     .memory = &memory,
     .tree_instance = &memory.tree,
     .status = (uint8_t *)memory.status,
@@ -120,5 +121,22 @@ const canopy_app_t room_app = {
     .rx = memory.rx,
     .tx = &memory.tx,
     .tx_memory = {.slots = memory.tx_slots, .data = memory.tx_data, .trace = memory.tx_trace, .trace_capacity = 1u},
-    .nodes_max = sizeof memory.status,
+    .nodes_max = ROOM_NODES,
 };
+#ifdef CANOPY_IN_PROCESS
+
+/* For a host program in the same process: where the entries lie. Not in firmware. */
+#include "canopy/in_process.h"
+
+extern const canopy_in_process_entry_t canopy_in_process_entries[];
+extern const uint32_t canopy_in_process_entry_count;
+extern const char *const *const canopy_in_process_texts;
+extern const uint32_t canopy_in_process_text_count;
+
+const canopy_in_process_entry_t canopy_in_process_entries[] = {
+    {.name = NULL},
+};
+const uint32_t canopy_in_process_entry_count = 0u;
+const char *const *const canopy_in_process_texts = NULL;
+const uint32_t canopy_in_process_text_count = 0u;
+#endif

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xbf8e39fa0ce5f853u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xe0a77569b3e82854u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H 0xbf8e39fa0ce5f853u /* of this run */
+#define CANOPY_GENERATED_ROOM_BUS_H 0xe0a77569b3e82854u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from integration.rig.vcan import IS_GUEST, Queue, Wire, age_ms, load_vcan, run
+from integration.rig.vcan import IS_GUEST, Queue, Wire, age_ms, load_vcan, vxcan_pair
 
 PERIOD_MS = 50
 SLACK_MS = 40
@@ -30,12 +30,8 @@ def echo() -> Iterator[None]:
 
 @pytest.fixture
 def pair() -> Iterator[None]:
-    """vxcan0 without an echo, whose wire ends in vxcan1: there a frame is seen when it has left, and not before."""
-    run("ip", "link", "add", "dev", "vxcan0", "type", "vxcan", "peer", "name", "vxcan1")
-    run("ip", "link", "set", "vxcan0", "up")
-    run("ip", "link", "set", "vxcan1", "up")
-    yield
-    run("ip", "link", "del", "vxcan0")
+    with vxcan_pair():
+        yield
 
 
 class Sender:

@@ -244,6 +244,33 @@ def test_interface_that_is_removed_and_made_anew(program: Path) -> None:
         run("ip", "link", "del", "vcan7")
 
 
+@needs_own_kernel
+def test_an_interface_that_is_gone_starts_no_process(program: Path, tmp_path: Path) -> None:
+    """Asked for a name that does not exist, the kernel may start modprobe, and the control loop waits for its end."""
+    setting = Path("/proc/sys/kernel/modprobe")
+    modprobe = setting.read_text(encoding="utf-8")
+    seen, stand_in = tmp_path / "seen", tmp_path / "modprobe"
+    stand_in.write_text(f'#!/bin/sh\necho "$@" >> {seen}\n', encoding="utf-8")
+    stand_in.chmod(0o755)
+    run("ip", "link", "add", "dev", "vcan7", "type", "vcan")
+    try:
+        setting.write_text(str(stand_in), encoding="utf-8")
+        with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as other, pytest.raises(OSError):
+            other.bind(("vcan8",))
+        assert "netdev-vcan8" in seen.read_text(encoding="utf-8")  # so it is what the kernel does
+        seen.unlink()
+        with CanProbe(program, "socketcan:vcan7") as probe:
+            run("ip", "link", "set", "vcan7", "up")
+            assert state(probe) == ACTIVE
+            run("ip", "link", "del", "vcan7")
+            for _ in range(5):
+                assert state(probe) == GONE
+                probe.ask("restart")
+            assert not seen.exists()
+    finally:
+        setting.write_text(modprobe, encoding="utf-8")
+
+
 def test_the_controllers_state_is_read_from_error_frames(probe: CanProbe) -> None:
     for frame, expected in (
         ("20000004#0008000000000000", WARNING),

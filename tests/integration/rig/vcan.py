@@ -8,6 +8,8 @@ import struct
 import subprocess
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 IS_GUEST = "User Mode Linux" in Path("/proc/cpuinfo").read_text()
@@ -33,25 +35,48 @@ def load_vcan(*, echo: bool) -> None:
     make_vcan0()
 
 
+@contextmanager
+def vxcan_pair() -> Iterator[None]:
+    """vxcan0 without an echo, whose wire ends in vxcan1: there a frame is seen when it has left, and not before."""
+    run("ip", "link", "add", "dev", "vxcan0", "type", "vxcan", "peer", "name", "vxcan1")
+    run("ip", "link", "set", "vxcan0", "up")
+    run("ip", "link", "set", "vxcan1", "up")
+    try:
+        yield
+    finally:
+        run("ip", "link", "del", "vxcan0")
+
+
 class Queue:
-    """An interface has a queue of so many frames, which can be held up."""
+    """An interface has a queue of so many frames, which can be held up at once."""
 
     def __init__(self, interface: str, length: int) -> None:
         self._interface = interface
         run("ip", "link", "set", interface, "txqueuelen", str(length))
         run("tc", "qdisc", "add", "dev", interface, "root", "plug", "limit", str(length * 72))
+        # One process for all changes: starting one for each takes longer than some blocks last.
+        self._tc = subprocess.Popen(["tc", "-batch", "-"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.release()
 
+    def _change(self, what: str) -> None:
+        assert self._tc.stdin is not None
+        assert self._tc.stdout is not None
+        self._tc.stdin.write(f"qdisc change dev {self._interface} root plug {what}\n")
+        self._tc.stdin.write(f"qdisc show dev {self._interface}\n")  # its answer says that the change is done
+        self._tc.stdin.flush()
+        assert "plug" in self._tc.stdout.readline(), "tc did not change the queue"
+
     def block(self) -> None:
-        run("tc", "qdisc", "change", "dev", self._interface, "root", "plug", "block")
+        self._change("block")
 
     def release(self) -> None:
-        run("tc", "qdisc", "change", "dev", self._interface, "root", "plug", "release_indefinite")
+        self._change("release_indefinite")
 
     def __enter__(self) -> Queue:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._tc.communicate()
         run("tc", "qdisc", "del", "dev", self._interface, "root")
 
 

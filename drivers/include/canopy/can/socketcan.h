@@ -5,7 +5,8 @@
  *
  * Threads: everything is called from the loop's thread. Signals end a wait early.
  * Blocking: only wait blocks. The rest is a few system calls each; restart may switch an interface off and on, which takes
- * as long as its kernel driver needs.
+ * as long as its kernel driver needs, and opening one that was gone waits while another process changes interfaces (the
+ * kernel's lock). The kernel is never asked for a name that does not exist: it would start modprobe and wait for its end.
  * Memory: the object is the caller's; nothing is allocated.
  *
  * Arrival: the kernel stamps received frames; the stamp is brought to CLOCK_MONOTONIC, so that setting the wall clock makes

@@ -59,10 +59,10 @@ def memory_under_reactive(facts: Facts) -> Iterator[Hit]:
     "Condition, or use a node with memory.",
 )
 def several_running(facts: Facts) -> Iterator[Hit]:
-    """One hit a node."""
+    """One hit a node. What nobody declared may be an action of one tick, and is not counted."""
     for parent in facts.nodes:
         if parent.type.name in REACTIVE:
-            running = [child for child in parent.children if R in facts.statuses(child)]
+            running = [child for child in parent.children if facts.runs(child)]
             if len(running) > 1:
                 names = ", ".join(label(child) for child in running)
                 yield hit(parent, f"{len(running)} children of {label(parent)} can be RUNNING: {names}")

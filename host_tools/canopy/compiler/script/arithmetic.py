@@ -12,7 +12,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from canopy.compiler.errors import nearest
-from canopy.compiler.numbers import plain
+from canopy.compiler.numbers import exact, plain
 from canopy.compiler.script.syntax import ScriptError
 from canopy.compiler.script.values import (
     INT64,
@@ -39,6 +39,8 @@ _COMPARE = {
     "==": operator.eq,
     "!=": operator.ne,
 }
+RANK = "text_rank"
+"""The C function that gives a text's place in the order of texts."""
 _HELPERS = {"+": "canopy_add", "-": "canopy_subtract", "*": "canopy_multiply"}
 
 
@@ -242,7 +244,7 @@ class Arithmetic:
         return Num(c, "int64_t" if wide else "int32_t", low, high, zeros=zeros, ones=ones)
 
     def compare(self, sign: str, left: Value, right: Value, index: int) -> Num | Const:
-        """One comparison; texts can only be equal or not."""
+        """One comparison; texts are in the order of their bytes."""
         texts = (TextConst, TextVar)
         if isinstance(left, texts) or isinstance(right, texts):
             return self._compare_texts(sign, left, right, index)
@@ -292,20 +294,23 @@ class Arithmetic:
         return boolean(f"({_operand(left, left.wide)} {sign} {number(bound, left.wide)})")
 
     def _compare_texts(self, sign: str, left: Value, right: Value, index: int) -> Num | Const:
-        if sign not in ("==", "!="):
-            raise ScriptError(index, f"texts have no order: '{sign}'", "only == and != compare texts")
         if isinstance(left, TextConst) and isinstance(right, TextConst):
-            return Const(Fraction((left.text == right.text) == (sign == "==")), is_bool=True)
+            return Const(Fraction(_COMPARE[sign](left.text.encode(), right.text.encode())), is_bool=True)
         if isinstance(left, TextConst):
-            left, right = right, left
+            left, right, sign = right, left, _MIRRORED[sign]
         if isinstance(left, TextVar) and isinstance(right, (TextVar, TextConst)):
-            return boolean(f"({left.c} {sign} {self.text(right)})")
+            if sign in ("==", "!="):
+                return boolean(f"({left.c} {sign} {self.text(right)})")
+            return boolean(f"({RANK}({left.c}) {sign} {RANK}({self.text(right)}))")
         if isinstance(left, Num) and left.choices and isinstance(right, TextConst):
             if right.text not in left.choices:
                 raise ScriptError(
                     index, f"'{right.text}' is no value of this signal", nearest(right.text, left.choices)
                 )
             return boolean(f"({_operand(left, left.wide)} {sign} {number(left.choices[right.text], left.wide)})")
+        number_ = _number_of(right) if isinstance(right, TextConst) else None
+        if number_ is not None and not isinstance(left, TextVar):
+            return self.compare(sign, left, number_, index)
         raise ScriptError(index, f"{describe(left)} cannot be compared with {describe(right)}")
 
     def text(self, value: TextConst | TextVar) -> str:
@@ -329,6 +334,16 @@ class Arithmetic:
         if isinstance(yes, (TextConst, TextVar)) and isinstance(no, (TextConst, TextVar)):
             return TextVar(f"(uint16_t)({condition.c} ? {self.text(yes)} : {self.text(no)})")
         raise ScriptError(index, f"'?:' chooses between {describe(yes)} and {describe(no)}", "both must be of one kind")
+
+
+def _number_of(text: TextConst) -> Const | None:
+    """The number that a text is, as BehaviorTree.CPP takes it where the other side is a number."""
+    if text.text in ("true", "false"):
+        return Const(Fraction(text.text == "true"), is_bool=True)
+    try:
+        return Const(exact(text.text))
+    except ValueError:
+        return None
 
 
 def _as_float(value: Fraction | int, index: int) -> float:

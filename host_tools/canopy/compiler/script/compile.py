@@ -10,11 +10,10 @@ from functools import cache
 
 from canopy.compiler.blackboard import Entry, Scope, SignalName
 from canopy.compiler.bus_reader import Bus, Message, Signal
-from canopy.compiler.codec import value_type
 from canopy.compiler.errors import CompileError, Place, nearest
-from canopy.compiler.numbers import exact, plain
-from canopy.compiler.port_types import DOUBLE, FLOAT, PortType
+from canopy.compiler.numbers import exact
 from canopy.compiler.script.arithmetic import Arithmetic
+from canopy.compiler.script.outputs import write_signal
 from canopy.compiler.script.storing import Storing, stripped
 from canopy.compiler.script.syntax import (
     Assignment,
@@ -27,6 +26,7 @@ from canopy.compiler.script.syntax import (
     ScriptError,
     Text,
     Unary,
+    parts,
 )
 from canopy.compiler.script.values import (
     INT64,
@@ -38,7 +38,6 @@ from canopy.compiler.script.values import (
     Value,
     boolean,
     common_scale,
-    describe,
 )
 
 FAULTS = "&app->entries.script_faults"
@@ -93,13 +92,16 @@ class Compiler:
     def __init__(self, scope: Scope, place: Place, bus: Bus, texts: Texts, floats: bool) -> None:
         self.scope = scope
         self._place = place
-        self._bus = bus
+        self.bus = bus
         self._texts = texts
-        self._arithmetic = Arithmetic(floats, FAULTS, texts.index)
-        self.storing = Storing(self._arithmetic, FAULTS)
+        self.arithmetic = Arithmetic(floats, FAULTS, texts.index)
+        self.storing = Storing(self.arithmetic, FAULTS)
         self.used: dict[str, Message] = {}
         self.tested: set[str] = set()
         self.parts: set[str] = set()
+        self._first: list[str] = []
+        self._seen: set[int] = set()
+        self._choosing = 0
 
     # Values
 
@@ -112,25 +114,45 @@ class Compiler:
         if isinstance(expression, Name):
             return self.named(expression.name, expression.index)
         if isinstance(expression, Unary):
-            return self._arithmetic.unary(expression.operator, self.evaluate(expression.operand), expression.index)
+            return self.arithmetic.unary(expression.operator, self.evaluate(expression.operand), expression.index)
         if isinstance(expression, Binary):
             return self._binary(expression)
         if isinstance(expression, Comparison):
             return self._chain(expression)
         if isinstance(expression, Conditional):
             condition = self.truth(expression.condition)
+            self._choosing += 1
             yes, no = self.evaluate(expression.yes), self.evaluate(expression.no)
-            return self._arithmetic.choose(condition, yes, no, expression.index)
-        raise ScriptError(expression.index, "an assignment inside an expression", "make it a statement of its own")
+            self._choosing -= 1
+            return self.arithmetic.choose(condition, yes, no, expression.index)
+        assert isinstance(expression, Assignment)
+        return self._assigned(expression)
+
+    def _assigned(self, expression: Assignment) -> Value:
+        """An assignment inside an expression: it is done before the rest, which must not have read the entry."""
+        target = self._resolve(expression.target.name, expression.target.index)
+        if self._choosing or isinstance(target, SignalName) or id(target) in self._seen:
+            why = "that is not always reached" if self._choosing else "that reads the entry before"
+            message = f"an assignment inside an expression {why}"
+            raise ScriptError(expression.index, message, "make it a statement of its own")
+        lines = self._lines(expression)
+        self._first += lines
+        return self.stored(target, expression.index)
+
+    def first(self) -> list[str]:
+        """C lines of assignments inside the expressions that were evaluated since the last call."""
+        lines, self._first = self._first, []
+        self._seen.clear()
+        return lines
 
     def truth(self, expression: Expression) -> Num | Const:
         """The expression as a condition."""
-        return self._arithmetic.truth(self.evaluate(expression), expression.index)
+        return self.arithmetic.truth(self.evaluate(expression), expression.index)
 
     def _binary(self, expression: Binary) -> Value:
         if expression.operator not in ("&&", "||"):
             left, right = self.evaluate(expression.left), self.evaluate(expression.right)
-            return self._arithmetic.binary(expression.operator, left, right, expression.index)
+            return self.arithmetic.binary(expression.operator, left, right, expression.index)
         return self._both(expression.operator, self.truth(expression.left), self.truth(expression.right))
 
     @staticmethod
@@ -147,7 +169,7 @@ class Compiler:
         answer: Num | Const = Const(Fraction(1), is_bool=True)
         for place, sign in enumerate(expression.operators):
             index = expression.operands[place + 1].index
-            answer = self._both("&&", answer, self._arithmetic.compare(sign, values[place], values[place + 1], index))
+            answer = self._both("&&", answer, self.arithmetic.compare(sign, values[place], values[place + 1], index))
         return answer
 
     def _comparable(self, part: Expression, chain: Comparison) -> Value:
@@ -163,7 +185,9 @@ class Compiler:
     # Names
 
     def named(self, name: str, index: int) -> Value:
-        """What a name's value is."""
+        """What a name's value is; the values of enums come first, as in BehaviorTree.CPP."""
+        if name in self.scope.board.enums:
+            return Const(Fraction(self.scope.board.enums[name]))
         return self.target_value(self._resolve(name, index), index)
 
     def _resolve(self, name: str, index: int) -> Entry | SignalName:
@@ -175,14 +199,18 @@ class Compiler:
     def entry(self, entry: Entry, index: int) -> Value:
         """An entry's value."""
         if entry.is_constant:
+            if entry.initial in dict(entry.type.names):
+                return Const(Fraction(dict(entry.type.names)[entry.initial or ""]))
             value = guess(entry.initial or "")
             return TextConst(entry.initial or "") if entry.type.kind == "text" else value
         if entry.initial is None and not entry.is_written:
-            raise ScriptError(index, f"nothing writes entry '{entry.name}'", self.scope.help_for(entry.name))
+            hint = f"{self.scope.help_for(entry.name)}; a value of an enum is declared: <Enum> in <TreeNodesModel>"
+            raise ScriptError(index, f"nothing writes entry '{entry.name}'", hint)
         return self.stored(entry, index)
 
     def stored(self, entry: Entry, index: int) -> Value:
         """The value of the entry's member."""
+        self._seen.add(id(entry))
         c, kind = f"app->entries.{entry.c_name}", entry.type
         if kind.kind == "any":
             raise UntypedError(entry)
@@ -194,26 +222,32 @@ class Compiler:
             return Double(c if kind.c == "double" else f"(double){c}")
         if kind.high > INT64[1]:
             return Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1], kind.scale)
-        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool")
+        choices = dict(kind.names)
+        return Num(c, kind.c, kind.low, kind.high, kind.scale, is_bool=kind.kind == "bool", choices=choices)
 
-    def _message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
+    def message(self, name: str, messages: tuple[Message, ...], verb: str, index: int) -> Message:
+        """The message of that name.
+
+        Raises:
+            ScriptError: it is none of these.
+        """
         for message in messages:
             if message.name == name:
                 return message
         known = [message.name for message in messages]
         raise ScriptError(
-            index, f"node '{self._bus.node}' of {self._bus.path.name} does not {verb} '{name}'", nearest(name, known)
+            index, f"node '{self.bus.node}' of {self.bus.path.name} does not {verb} '{name}'", nearest(name, known)
         )
 
     def signal(self, text: str, index: int) -> Num | Double:
         """A received signal in physical units, or whether its message is fresh."""
         message_name, _, signal_name = text.partition(".")
-        message = self._message(message_name, self._bus.receive, "receive", index)
+        message = self.message(message_name, self.bus.receive, "receive", index)
         member = f"app->input.{message.c_name}"
         if signal_name == "fresh":
             self.tested.add(message.name)
             return Num(f"{member}.fresh", "bool", 0, 1, is_bool=True)
-        signal = self._signal(message, signal_name, index)
+        signal = self.known_signal(message, signal_name, index)
         self.used[message.name] = message
         if signal in message.multiplexed:
             self.parts.add(f"{member}.{signal.has_name}")
@@ -228,9 +262,14 @@ class Compiler:
             raw = Num(f"canopy_limit_unsigned({c}, {FAULTS})", "int64_t", 0, INT64[1])
         return self._physical(raw, signal, index)
 
-    def _signal(self, message: Message, name: str, index: int) -> Signal:
+    def known_signal(self, message: Message, name: str, index: int) -> Signal:
+        """The signal of that name.
+
+        Raises:
+            ScriptError: the message has none, or it is floating point where that is not allowed.
+        """
         for signal in message.signals:
-            if signal.name == name and signal.is_float and not self._arithmetic.floats:
+            if signal.name == name and signal.is_float and not self.arithmetic.floats:
                 raise ScriptError(
                     index,
                     f"'{message.name}.{name}' is floating point, which this application does not allow",
@@ -243,22 +282,22 @@ class Compiler:
 
     def _float(self, raw: Double, signal: Signal, index: int) -> Double:
         """A floating-point signal in physical units."""
-        scaled = raw if signal.scale == 1 else self._arithmetic.binary("*", raw, Const(Fraction(signal.scale)), index)
+        scaled = raw if signal.scale == 1 else self.arithmetic.binary("*", raw, Const(Fraction(signal.scale)), index)
         if signal.offset != 0:
-            scaled = self._arithmetic.binary("+", scaled, Const(Fraction(signal.offset)), index)
+            scaled = self.arithmetic.binary("+", scaled, Const(Fraction(signal.offset)), index)
         assert isinstance(scaled, Double)
         return scaled
 
     def _physical(self, raw: Num, signal: Signal, index: int) -> Num:
         scale, offset, step = _steps(signal.scale, signal.offset)
-        value = self._arithmetic.scaled(Num(raw.c, raw.c_type, raw.low, raw.high, abs(scale)), step, index)
+        value = self.arithmetic.scaled(Num(raw.c, raw.c_type, raw.low, raw.high, abs(scale)), step, index)
         if scale < 0:
-            negative = self._arithmetic.unary("-", value, index)
+            negative = self.arithmetic.unary("-", value, index)
             assert isinstance(negative, Num)
             value = negative
         shift = int(offset / step)
         if shift:
-            moved = self._arithmetic.binary("+", value, Const(offset), index)
+            moved = self.arithmetic.binary("+", value, Const(offset), index)
             assert isinstance(moved, Num)
             value = moved
         factor = int(scale / step)
@@ -271,21 +310,41 @@ class Compiler:
 
     def compare_values(self, sign: str, left: Value, right: Value) -> Num | Const:
         """A comparison of values that are no expressions: a Switch's cases."""
-        return self._arithmetic.compare(sign, left, right, 0)
+        return self.arithmetic.compare(sign, left, right, 0)
 
     # Statements
 
     def statement(self, expression: Expression) -> list[str]:
         """C lines of a statement; none for one that only computes."""
+        if isinstance(expression, Conditional) and any(isinstance(part, Assignment) for part in parts(expression)):
+            return self._branches(expression)
         if not isinstance(expression, Assignment):
             self.evaluate(expression)
-            return []
+            return self.first()
+        lines = self._lines(expression)
+        return [*self.first(), *lines]
+
+    def _branches(self, expression: Conditional) -> list[str]:
+        """A choice between statements: `c ? a := 1 : b := 2`."""
+        condition = self.truth(expression.condition)
+        first = self.first()
+        yes, no = self.statement(expression.yes), self.statement(expression.no)
+        if isinstance(condition, Const):
+            return [*first, *(yes if condition.value else no)]
+        indented = [[f"    {line}" for line in lines] for lines in (yes, no)]
+        lines = [f"if ({stripped(condition.c)}) {{", *indented[0]]
+        return [*first, *lines, *(["} else {", *indented[1]] if no else []), "}"]
+
+    def _lines(self, expression: Assignment) -> list[str]:
+        if expression.target.name in self.scope.board.enums:
+            message = f"'{expression.target.name}' is a value of an enum: it cannot be written"
+            raise ScriptError(expression.target.index, message, "give the entry another name")
         target = self._resolve(expression.target.name, expression.target.index)
         if isinstance(target, SignalName):
-            return self._write_signal(target.text, expression)
+            return write_signal(self, target.text, expression)
         value = self.evaluate(expression.value)
         if expression.operator not in (":=", "="):
-            value = self._arithmetic.binary(
+            value = self.arithmetic.binary(
                 expression.operator[0], self.stored(target, expression.index), value, expression.index
             )
         if target.type.kind == "any":
@@ -299,73 +358,3 @@ class Compiler:
         if target.counted:
             lines.append(f"app->entries.{target.c_name}_updates++;")
         return lines
-
-    def _write_signal(self, text: str, expression: Assignment) -> list[str]:
-        message_name, _, signal_name = text.partition(".")
-        index = expression.target.index
-        message = self._message(message_name, self._bus.send, "send", index)
-        signal = self._signal(message, signal_name, index)
-        if expression.operator not in (":=", "="):
-            raise ScriptError(
-                index, f"'{text}' is an output: it is written, not read", "compute in an entry, then write"
-            )
-        value = self.evaluate(expression.value)
-        setter = f"{self._bus.name}_set_{message.c_name}_{signal.c_name}"
-        c = self._raw(value, message, signal, expression.value.index, text)
-        return [f"{setter}(&app->output, {stripped(c)});"]
-
-    def _raw(self, value: Value, message: Message, signal: Signal, index: int, text: str) -> str:
-        """The C expression of a raw value, of the setter's type."""
-        if signal.is_float:
-            return self._raw_float(value, signal, index)
-        if isinstance(value, TextConst) and signal.choices:
-            names = {named.text: named.c_name for named in signal.enumerators if signal.is_enum}
-            names = names or {named.text: named.c_name for named in signal.exceptions}
-            if value.text not in names:
-                raise ScriptError(index, f"'{value.text}' is no value of '{text}'", nearest(value.text, names))
-            return f"{self._bus.name.upper()}_{names[value.text]}"
-        if signal.is_enum:
-            if not isinstance(value, (Num, Const)):
-                raise ScriptError(index, f"{describe(value)} is no value of '{text}'")
-            wide = PortType("int", "int32_t", -(2**31), 2**31 - 1)
-            enum = f"{self._bus.name}_{message.c_name}_{signal.c_name}_t"
-            return f"({enum})({self.storing.whole(value, wide, index)})"
-        if signal.is_bool:
-            truth = self._arithmetic.truth(value, index)
-            return ("true" if truth.value else "false") if isinstance(truth, Const) else truth.c
-        if not isinstance(value, (Num, Const)):
-            raise ScriptError(
-                index,
-                f"{describe(value)} cannot be written to '{text}', which is in fixed point",
-                "compute it in whole numbers",
-            )
-        return self._raw_number(value, signal, index, text)
-
-    def _raw_float(self, value: Value, signal: Signal, index: int) -> str:
-        raw = value
-        if signal.offset != 0:
-            raw = self._arithmetic.binary("-", raw, Const(Fraction(signal.offset)), index)
-        if signal.scale != 1:
-            raw = self._arithmetic.binary("/", raw, Const(Fraction(signal.scale)), index)
-        return self.storing.convert(raw, FLOAT if signal.c_type == "float" else DOUBLE, index)
-
-    def _raw_number(self, value: Num | Const, signal: Signal, index: int, text: str) -> str:
-        scale, offset = Fraction(signal.scale), Fraction(signal.offset)
-        moved = self._arithmetic.binary("-", value, Const(offset), index)
-        raw = self._arithmetic.binary("/", moved, Const(scale), index)
-        if isinstance(raw, Const):
-            if raw.value.denominator != 1:
-                raise ScriptError(
-                    index, f"'{text}' is in steps of {signal.scale}: this value lies between two", "round it"
-                )
-            if not signal.low <= raw.value <= signal.high:
-                ends = sorted((signal.low * scale + offset, signal.high * scale + offset))
-                raise ScriptError(index, f"outside the range of '{text}' [{plain(ends[0])}, {plain(ends[1])}]")
-        assert isinstance(raw, (Num, Const))
-        if isinstance(raw, Num) and raw.scale.denominator != 1:
-            raise ScriptError(
-                index, f"'{text}' is in steps of {signal.scale}: the value would be rounded", "use such steps"
-            )
-        c_type = value_type(signal)
-        low, high = {"int32_t": (-(2**31), 2**31 - 1), "int64_t": INT64, "uint64_t": (0, 2**64 - 1)}[c_type]
-        return self.storing.whole(raw, PortType("int", c_type, low, high), index)

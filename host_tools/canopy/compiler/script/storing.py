@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 
+from canopy.compiler.errors import nearest
 from canopy.compiler.numbers import plain
 from canopy.compiler.port_types import PortType, fits_float, integer
 from canopy.compiler.script.arithmetic import Arithmetic
@@ -32,7 +33,14 @@ class Storing:
         if kind.kind == "text":
             if isinstance(value, (TextConst, TextVar)):
                 return self._arithmetic.text(value)
+            if isinstance(value, Const) and value.value.denominator == 1 and not value.is_bool:
+                return self._arithmetic.text(TextConst(plain(value.value)))  # a text port reads a number as text
             raise ScriptError(index, f"{describe(value)} cannot be stored as a text", "write it in '…'")
+        if isinstance(value, TextConst) and kind.names:
+            named = dict(kind.names)
+            if value.text not in named:
+                raise ScriptError(index, f"'{value.text}' is no value of {kind}", nearest(value.text, named))
+            return integer(named[value.text], kind)
         if isinstance(value, (TextConst, TextVar)) or kind.kind == "user":
             raise ScriptError(index, f"{describe(value)} cannot be stored as {kind}")
         if kind.kind == "float":

@@ -1,27 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The grammar of scripts, and its parser.
+"""The grammar of scripts, and its parser: that of BehaviorTree.CPP 4.10.
 
-    script     = [statement {";" statement}] [";"]
-    statement  = [name (":=" | "=" | "+=" | "-=" | "*=" | "/=")] conditional
-    conditional = logical ["?" conditional ":" conditional]
-    logical    = comparison {"&&" comparison} | comparison {"||" comparison}
-    comparison = operand {("==" | "!=" | "<" | "<=" | ">" | ">=") operand}
-    operand    = math | bits
-    math       = product {("+" | "-" | "..") product}        product = prefix {("*" | "/") prefix}
-    bits       = bit_and {("|" | "^") bit_and}               bit_and = prefix {"&" prefix}
-    prefix     = {"-" | "!" | "~"} atom
-    atom       = number | 'text' | true | false | name | "(" conditional ")"
-
-BehaviorTree.CPP gives && and || the same precedence, which no reader expects: mixing them needs parentheses here. As
-there, mixing + - * / with & | ^ needs parentheses.
+script     = [expression {";" expression}] [";"]
+expression = name (":=" | "=" | "+=" | "-=" | "*=" | "/=") expression
+           | binary ["?" expression ":" conditional]
+binary     = prefix {operator prefix}, where operators bind in this order, the loosest first, each from left to right:
+             "||"    "&&"    "==" "!=" "<" "<=" ">" ">=", which chain    "|" "^"    "&"    "+" "-" ".."    "*" "/"
+prefix     = {"-" | "!" | "~"} atom
+atom       = number | 'text' | true | false | name | "(" expression ")"
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from canopy.compiler.numbers import exact
 
@@ -31,8 +25,17 @@ MAX_WORDS = 200  # of a statement: names, numbers, operators
 
 ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
 COMPARISONS = ("==", "!=", "<=", ">=", "<", ">")
-MATH = ("+", "-", "..", "*", "/")
-BITS = ("&", "|", "^")
+# How tightly an operator binds; what binds tighter is computed first.
+COMPARING = 5
+POWERS = {
+    "||": 3,
+    "&&": 4,
+    **dict.fromkeys(COMPARISONS, COMPARING),
+    **dict.fromkeys(("|", "^"), 6),
+    "&": 7,
+    **dict.fromkeys(("+", "-", ".."), 8),
+    **dict.fromkeys(("*", "/"), 9),
+}
 
 _TOKEN = re.compile(
     r"""\s*(?:
@@ -121,7 +124,7 @@ class Conditional(Expression):
 
 @dataclass(frozen=True)
 class Assignment(Expression):
-    """A statement that writes."""
+    """What writes; its value is what is then stored."""
 
     operator: str
     target: Name
@@ -192,7 +195,7 @@ class _Parser:
             if self._is(";"):
                 self._take()
                 continue
-            statements.append(self._statement())
+            statements.append(self._expression())
             if self._peek().kind != "end" and not self._is(";"):
                 token = self._peek()
                 raise ScriptError(
@@ -202,84 +205,58 @@ class _Parser:
             raise ScriptError(0, "the script is empty")
         return tuple(statements)
 
-    def _statement(self) -> Expression:
-        first = self._peek()
-        value = self._conditional()
-        if not self._is(*ASSIGNMENTS):
-            return value
-        operator = self._take()
-        if not isinstance(value, Name):
-            raise ScriptError(first.index, f"the left side of '{operator.text}' must be a name", "to compare, write ==")
-        return Assignment(first.index, operator.text, value, self._conditional())
-
-    def _conditional(self) -> Expression:
+    def _expression(self) -> Expression:
+        """With assignments, which take all that follows."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise ScriptError(self._peek().index, f"nested more than {MAX_NESTING} deep")
-        condition = self._logical()
-        if self._is("?"):
-            index = self._take().index
-            yes = self._conditional()
-            self._expect(":", "after '?'")
-            condition = Conditional(index, condition, yes, self._conditional())
+        first = self._peek()
+        value = self._conditional()
+        if self._is(*ASSIGNMENTS):
+            operator = self._take()
+            if not isinstance(value, Name):
+                message = f"the left side of '{operator.text}' must be a name"
+                raise ScriptError(first.index, message, "to compare, write ==")
+            value = Assignment(first.index, operator.text, value, self._expression())
         self._nesting -= 1
-        return condition
+        return value
 
-    def _logical(self) -> Expression:
-        left = self._comparison()
-        if not self._is("&&", "||"):
-            return left
-        operator = self._peek().text
-        while self._is("&&", "||"):
+    def _conditional(self) -> Expression:
+        condition = self._binary(0)
+        if not self._is("?"):
+            return condition
+        self._nesting += 1
+        if self._nesting > MAX_NESTING:
+            raise ScriptError(self._peek().index, f"nested more than {MAX_NESTING} deep")
+        index = self._take().index
+        yes = self._expression()
+        self._expect(":", "after '?'")
+        no = self._conditional()
+        self._nesting -= 1
+        return Conditional(index, condition, yes, no)
+
+    def _power(self) -> int:
+        token = self._peek()
+        return POWERS.get(token.text, 0) if token.kind == "operator" else 0
+
+    def _binary(self, least: int) -> Expression:
+        """Operators that bind tighter than `least`."""
+        left = self._prefix()
+        while self._power() > least:
+            if self._power() == COMPARING:
+                left = self._chain(left)
+                continue
             token = self._take()
-            if token.text != operator:
-                raise ScriptError(
-                    token.index,
-                    "&& and || in one row",
-                    "use parentheses: BehaviorTree.CPP reads such a row from left to right, most people do not",
-                )
-            left = Binary(token.index, operator, left, self._comparison())
+            left = Binary(token.index, token.text, left, self._binary(POWERS[token.text]))
         return left
 
-    def _comparison(self) -> Expression:
-        operands = [self._operand()]
+    def _chain(self, first: Expression) -> Expression:
+        operands = [first]
         operators = []
         while self._is(*COMPARISONS):
             operators.append(self._take().text)
-            operands.append(self._operand())
-        if not operators:
-            return operands[0]
-        return Comparison(operands[0].index, tuple(operands), tuple(operators))
-
-    def _operand(self) -> Expression:
-        first = self._prefix()
-        others: tuple[str, ...]
-        if self._is(*MATH):
-            result, others = self._row(self._row_of_products, ("+", "-", ".."), first), BITS
-        elif self._is(*BITS):
-            result, others = self._row(self._row_of_ands, ("|", "^"), first), MATH
-        else:
-            return first
-        if self._is(*others):
-            raise ScriptError(
-                self._peek().index, "+ - * / and & | ^ in one row", "use parentheses to say what is computed first"
-            )
-        return result
-
-    def _row(
-        self, part: Callable[[Expression | None], Expression], operators: tuple[str, ...], first: Expression | None
-    ) -> Expression:
-        left = part(first)
-        while self._is(*operators):
-            token = self._take()
-            left = Binary(token.index, token.text, left, part(None))
-        return left
-
-    def _row_of_products(self, first: Expression | None) -> Expression:
-        return self._row(lambda known: known or self._prefix(), ("*", "/"), first)
-
-    def _row_of_ands(self, first: Expression | None) -> Expression:
-        return self._row(lambda known: known or self._prefix(), ("&",), first)
+            operands.append(self._binary(COMPARING))
+        return Comparison(first.index, tuple(operands), tuple(operators))
 
     def _prefix(self) -> Expression:
         operators = []
@@ -306,17 +283,14 @@ class _Parser:
                 return Number(token.index, Fraction(token.text == "true"), is_bool=True)
             return Name(token.index, token.text)
         if token.text == "(":
-            inner = self._conditional()
-            if self._is(*ASSIGNMENTS):
-                raise ScriptError(
-                    self._peek().index, "an assignment inside an expression", "make it a statement of its own"
-                )
+            inner = self._expression()
             self._expect(")", f"for the '(' at character {token.index + 1}")
             return inner
         what = f"'{token.text}'" if token.text else "the end of the script"
         raise ScriptError(token.index, f"a value is expected here, not {what}")
 
 
+@lru_cache(maxsize=100_000)  # conditions of a tree are often the same
 def parse(text: str) -> tuple[Expression, ...]:
     """The statements of a script, at least one.
 
