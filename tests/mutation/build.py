@@ -132,7 +132,7 @@ class Worker:
                 _run(self._command(unit), self._sources)
             _run([*self._link, *self._objects()], self._sources)
             for test in self._bench.order(mutant.file):
-                if not self.passes(test, 10 * test.seconds + 2):
+                if not self.passes(test, 20 * test.seconds + 10):
                     self._bench.kills[mutant.file, test.name] += 1
                     return test.name
             changed = {unit: self._machine_code(unit) for unit in units}
