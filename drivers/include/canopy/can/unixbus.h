@@ -24,7 +24,7 @@
  * Errors of the operating system: none lasts. A receive that failed is told once by receive() or wait(), and is tried again
  * 10 ms later; a folder that could not be read is read again at the next send.
  *
- * Memory: the object is the caller's (about 290 KiB: make it static), and one file descriptor for each other participant;
+ * Memory: the object is the caller's (about 350 KiB: make it static), and one file descriptor for each other participant;
  * the operating system's thread and directory functions allocate.
  */
 #ifndef CANOPY_CAN_UNIXBUS_H
@@ -55,7 +55,7 @@
 #define CANOPY_UNIXBUS_BACKLOG 1024u
 
 /** Frames that can wait while the driver's thread is at work on the list of participants. */
-#define CANOPY_UNIXBUS_INBOX 256u
+#define CANOPY_UNIXBUS_INBOX 1024u
 
 /** How long a frame is offered to a participant that is full [us]: an old command must not arrive late. */
 #define CANOPY_UNIXBUS_LATE_US 100000u
