@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from canopy.files import FileError, read_text
-from canopy.live.trace_model import MESSAGES, TYPES, VERSION, Trace, TraceValue
+from canopy.live.trace_model import MESSAGES, NO_TRACE, TYPES, VERSION, Trace, TraceValue
 
 FORMAT = 2
 CATEGORIES = ("control", "decorator", "condition", "action")
@@ -197,7 +197,7 @@ class _Reader:
     def _trace(self, data: dict[str, Any]) -> Trace:
         if "trace" in data and data["trace"] is None:
             if not self._traced:
-                return Trace(base=0, extended=False, guard=None, changes_max=1, known_within_ms=0, values=(), texts=())
+                return NO_TRACE
             raise self.error(
                 "trace",
                 "is null: the application was built without a trace, so nothing can be watched; build it with "
