@@ -46,7 +46,7 @@ static void encode_touch(const canopy_sim_robot_t *robot, uint8_t *data)
 
 static void encode_voice(const canopy_sim_robot_t *robot, uint8_t *data)
 {
-    big_voice_t voice = {.count = robot->wishes, .suggestion = (big_voice_suggestion_t)robot->wish};
+    big_voice_t voice = {.count = robot->wishes, .suggestion = (uint8_t)robot->wish};
 
     (void)big_voice_encode(&voice, data, LONGEST);
 }
@@ -54,7 +54,7 @@ static void encode_voice(const canopy_sim_robot_t *robot, uint8_t *data)
 static void encode_ball(const canopy_sim_robot_t *robot, uint8_t *data)
 {
     big_ball_t ball = {.tracked = robot->tracked,
-                       .hand = (big_ball_hand_t)robot->hand,
+                       .hand = (uint8_t)robot->hand,
                        .distance = (uint16_t)(robot->ball_um / UM_PER_MM)};
 
     (void)big_ball_encode(&ball, data, LONGEST);
@@ -62,11 +62,11 @@ static void encode_ball(const canopy_sim_robot_t *robot, uint8_t *data)
 
 static void encode_acts(const canopy_sim_robot_t *robot, uint8_t *data)
 {
-    big_acts_t acts = {.speech_state = (big_acts_speech_state_t)robot->speech.state,
-                       .arms_state = (big_acts_arms_state_t)robot->arms.state,
-                       .said = (big_acts_said_t)robot->speech.what,
+    big_acts_t acts = {.speech_state = (uint8_t)robot->speech.state,
+                       .arms_state = (uint8_t)robot->arms.state,
+                       .said = (uint8_t)robot->speech.what,
                        .say_number = robot->speech.number,
-                       .arms = (big_acts_arms_t)robot->arms.what,
+                       .arms = (uint8_t)robot->arms.what,
                        .arms_number = robot->arms.number};
 
     (void)big_acts_encode(&acts, data, LONGEST);
