@@ -14,7 +14,7 @@ PORTABLE := i686 powerpc asan-clang asan-i686 asan-i686-clang ubsan-powerpc msan
 BUILD = cmake --preset $(1) && cmake --build --preset $(1)
 
 .PHONY: help demo test lint format check-all bench clean test-host test-firmware test-python test-rig test-clang test-asan
-.PHONY: coverage figures golden fuzz proof test-logic test-portable test-trace
+.PHONY: coverage figures golden fuzz proof test-logic test-portable test-trace mutation mutation-sample long-run kill-run
 .NOTPARALLEL:
 
 help: ## list the targets
@@ -70,7 +70,7 @@ format: ## let clang-format and ruff rewrite the sources
 check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,plot,test,verify,differential
-	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-logic test-portable coverage test-differential test-asan fuzz
+	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-logic test-portable coverage test-differential test-asan mutation-sample fuzz
 
 test-clang: # the unit tests, and the tests of generated C that need a second compiler
 	$(call BUILD,clang)
@@ -106,6 +106,22 @@ test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
 	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang and not logic" tests/integration tests/differential
+
+mutation: ## change the runtime a little, 3,000 times, and see whether a unit test notices (an hour on two idle cores)
+	$(call BUILD,asan)
+	PYTHONPATH=tests $(PYTHON) -m mutation build/asan --jobs $(CMAKE_BUILD_PARALLEL_LEVEL)
+
+mutation-sample: # 25 of them, in files of which all is known
+	$(call BUILD,asan)
+	PYTHONPATH=tests $(PYTHON) -m mutation build/asan --jobs $(CMAKE_BUILD_PARALLEL_LEVEL) --sample 25 --seed $${CANOPY_SEED:-$$(date +%s)}
+
+long-run: ## an hour at 1 ms with robot, monitor, bridge and record: SECONDS=3600
+	$(call BUILD,host)
+	PYTHONPATH=tests $(PYTHON) -m endurance long --seconds $${SECONDS:-3600}
+
+kill-run: ## kill -9 of any of these programs, TIMES=50 times, at random
+	$(call BUILD,host)
+	PYTHONPATH=tests $(PYTHON) -m endurance kill --times $${TIMES:-50} --seed $${CANOPY_SEED:-$$(date +%s)}
 
 fuzz: ## libFuzzer on tables, images, states, frames and traces; then hostile files to C to the machine: FUZZ_SECONDS=60 each
 	$(SETUP)/ensure-packages fuzz

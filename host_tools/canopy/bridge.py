@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING, Any
 import can
 import click
 
-from canopy.canbus import CanBusError, is_plain_data, open_bus
+from canopy.can_bus.steady import SteadyBus
+from canopy.canbus import CanBusError, is_plain_data
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import echo
 from canopy.lcm_link import CHANNEL_TREE, CHANNEL_TREE_STRUCTURE, DEFAULT_URL, open_lcm, utime_now
 from canopy.live.lcm_messages import status_message, structure_message
 from canopy.live.rest_of_tick import RestOfTick
 from canopy.model import Model, ModelError, load_model
+from canopy.process.say import Voice
+from canopy.process.status import NOTHING
 from canopy.stop import StopFlag
 from canopy.trace import TraceDecoder, TreeView
 
@@ -47,6 +50,8 @@ class Summary:
     crc_errors: int = 0
     """Of these: CanopyTick frames with a wrong CRC, where they are protected."""
     overruns: int = 0
+    disagreements: int = 0
+    """How often a CanopyModel began to claim another tree than the model's."""
 
     def text(self) -> str:
         """One line for people."""
@@ -54,13 +59,14 @@ class Summary:
             f"canopy bridge: {self.application}: {self.ticks} ticks seen ({self.incomplete} incomplete, "
             f"{self.ticks_missed} missed), {self.published} LCM messages published, {self.publish_failed} failed; "
             f"{self.lost} trace frames lost, {self.refused} refused; {self.overruns} overruns, {self.restarts} restarts"
+            + (f"; {self.disagreements} claims of another tree" if self.disagreements else "")
         )
 
 
 class Bridge:
     """Takes the bus's frames, publishes what they tell. Without LCM (None) it only counts."""
 
-    def __init__(self, model: Model, link: lcm.LCM | None, structure_period: float) -> None:
+    def __init__(self, model: Model, link: lcm.LCM | None, structure_period: float, voice: Voice) -> None:
         self.summary = Summary(model.application)
         self._model = model
         self._link = link
@@ -68,20 +74,25 @@ class Bridge:
         self._structure_period = structure_period
         self._structure_due = 0.0
         self._rest = RestOfTick(model)
+        self._voice = voice
+        self._claim: str | None = None
 
     def feed(self, identifier: int, data: bytes, utime: int) -> None:
-        """Takes one data frame that was received at `utime` [µs since 1970].
-
-        Raises:
-            ModelError: The controller says that it runs another tree than the model's.
-        """
+        """Takes one data frame that was received at `utime` [µs since 1970]."""
         now = time.monotonic()
         if self._rest.is_over(now):
             self._take(self._decoder.flush(), utime)
         self._rest.saw(identifier, now)
         self._take(self._decoder.feed(identifier, data), utime)
-        if self._decoder.mismatch is not None:
-            raise ModelError(self._decoder.mismatch)
+        self._compare()
+
+    def _compare(self) -> None:
+        """Says once that the controller claims another tree than the model's: anybody can, on a bus."""
+        claim = self._decoder.mismatch
+        if claim is not None and claim != self._claim:
+            self._voice.say(claim, "model")
+            self.summary.disagreements += 1
+        self._claim = claim
 
     def idle(self) -> None:
         """Call this often: sends what is due, and gives up waiting for frames that no longer come."""
@@ -127,12 +138,8 @@ class Bridge:
             self.summary.published += 1
 
 
-def run(bridge: Bridge, bus: can.BusABC, stop: StopFlag, duration: float | None) -> None:
-    """Until a signal comes or `duration` [s] is over.
-
-    Raises:
-        can.CanError: The bus has failed.
-    """
+def run(bridge: Bridge, bus: SteadyBus, stop: StopFlag, duration: float | None) -> None:
+    """Until a signal comes or `duration` [s] is over."""
     end = None if duration is None else time.monotonic() + duration
     while not stop and (end is None or time.monotonic() < end):
         message = bus.recv(_POLL_S)
@@ -167,21 +174,26 @@ def command(
     """Publish a controller's trace on LCM.
 
     Each tick is published as a tree_status_t on CANOPY_TREE, the tree's structure as a tree_structure_t on
-    CANOPY_TREE_STRUCTURE. Without LCM on this machine it says so and only counts. Runs until Ctrl-C; a summary is
-    printed at the end.
+    CANOPY_TREE_STRUCTURE. Without LCM on this machine it says so and only counts. A bus that is not there, down or gone
+    is waited for. Runs until Ctrl-C; a summary is printed at the end.
 
-    Exit status: 0 done, 1 the model or the bus cannot be used, 2 wrong command line.
+    Exit status: 0 done, 1 nothing ever came, or the model or the bus cannot be used, 2 wrong command line.
     """
+    voice = Voice("canopy bridge")
     with StopFlag() as stop:
         try:
             model = load_model(model_path)
-            with open_bus(bus_name) as bus:
-                bridge = Bridge(model, open_lcm(lcm_url, "canopy bridge"), structure_period)
+            with SteadyBus(bus_name, voice) as bus:
+                bridge = Bridge(model, open_lcm(lcm_url, "canopy bridge"), structure_period, voice)
                 bridge.idle()
                 echo(f"canopy bridge: {model.application} on {bus_name}", err=True)
                 run(bridge, bus, stop, duration)
         except (ModelError, CanBusError, can.CanError) as error:
             echo(f"canopy bridge: {error}", err=True)
-            sys.exit(1)
+            sys.exit(NOTHING)
         summary = bridge.end()
+    voice.end()
     echo(dumps(asdict(summary)) if as_json else summary.text())
+    if not bus.heard:
+        echo(f"canopy bridge: nothing came on {bus_name}; `canopy buses` lists the buses that there are", err=True)
+        sys.exit(NOTHING)

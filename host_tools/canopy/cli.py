@@ -24,6 +24,7 @@ SUBCOMMANDS = {
     "show": ("canopy.show.cli", "Draw a tree, in the terminal, as SVG or as DOT."),
     "fmt": ("canopy.fmt.cli", "Write tree files in one canonical form."),
     "convert": ("canopy.convert.cli", "Convert other architectures into trees, and trees into state machines."),
+    "buses": ("canopy.can_bus.buses", "List the CAN buses of this machine."),
     "demo": ("canopy.demo", "Run the NAO example in the terminal."),
     "sim": ("canopy.live.robot_command", "Tell the simulated robot something."),
     "monitor": ("canopy.monitor", "Watch a controller's tree and signals live."),

@@ -7,6 +7,7 @@ Every host tool reads this one file, `<application>.model.json`, and the DBC tha
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +16,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from canopy.files import FileError, read_text
-from canopy.live.trace_model import MESSAGES, TYPES, VERSION, Trace, TraceValue
+from canopy.live.trace_model import MESSAGES, NO_TRACE, TYPES, VERSION, Trace, TraceValue
 
 FORMAT = 2
 CATEGORIES = ("control", "decorator", "condition", "action")
 PERIOD_US_MAX = 3_600_000_000
 LINE_MAX = 2**31 - 1
+_TEXT_MAX = 1000
 DATA_ID_MAX = 0xFFFF
 SLOTS_MAX = 4096
 CHANGES_MAX = 32
@@ -31,7 +33,14 @@ T = TypeVar("T")
 
 
 class ModelError(ValueError):
-    """The model file cannot be used; the text names the file, the place in it, and the way out."""
+    """The model file cannot be used; the text names the file, the place in it, and the way out.
+
+    What is in the file may be long: the middle of a long text is left out.
+    """
+
+    def __init__(self, text: str) -> None:
+        half = _TEXT_MAX // 2
+        super().__init__(text if len(text) <= _TEXT_MAX else f"{text[:half]} … {text[-half:]}")
 
 
 @dataclass(frozen=True)
@@ -93,9 +102,10 @@ def load_model(path: Path, *, traced: bool = True) -> Model:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ModelError(f"{path}: is no JSON: {error}") from error
-    model = _Reader(path, data, traced=traced).model()
-    if not model.dbc.is_file():
-        raise ModelError(f"{path}: bus.dbc: {model.dbc} is not there; it is written beside the model file")
+    reader = _Reader(path, data, traced=traced)
+    model = reader.model()
+    if not os.path.isfile(model.dbc):  # Path.is_file() raises where the name is too long
+        raise reader.error("bus.dbc", f"{model.dbc} is not there; it is written beside the model file")
     return model
 
 
@@ -111,7 +121,7 @@ class _Reader:
     def model(self) -> Model:
         data = self._object(self._data, "the file")
         if self._get(data, "", "format", int) != FORMAT:
-            raise self._error(
+            raise self.error(
                 "format", f"is {data['format']}, these tools read {FORMAT}: {self._way_out(data['format'])}"
             )
         tree = self._get(data, "", "tree", dict)
@@ -135,12 +145,12 @@ class _Reader:
     def _hash(self, data: dict[str, Any]) -> str:
         value = self._get(data, "", "hash", str)
         if re.fullmatch("[0-9a-f]{16}", value) is None:
-            raise self._error("hash", f"is '{value}', must be 16 hexadecimal digits")
+            raise self.error("hash", f"is '{value}', must be 16 hexadecimal digits")
         return value
 
     def _nodes(self, items: list[Any]) -> tuple[Node, ...]:
         if not items:
-            raise self._error("tree.nodes", "is empty")
+            raise self.error("tree.nodes", "is empty")
         self._node_count = len(items)
         nodes: list[Node] = []
         open_nodes: list[Node] = []  # the ancestors of the node at hand
@@ -151,9 +161,9 @@ class _Reader:
             parent = open_nodes[-1] if open_nodes else None
             limit = parent.end if parent else len(items)
             if node.index != index or node.parent != (parent.index if parent else None) or (index and not parent):
-                raise self._error(f"tree.nodes[{index}]", "is not in depth-first order (index, parent, end)")
+                raise self.error(f"tree.nodes[{index}]", "is not in depth-first order (index, parent, end)")
             if not index < node.end <= limit:
-                raise self._error(f"tree.nodes[{index}].end", f"is {node.end}, must be {index + 1}…{limit}")
+                raise self.error(f"tree.nodes[{index}].end", f"is {node.end}, must be {index + 1}…{limit}")
             nodes.append(node)
             open_nodes.append(node)
         return tuple(nodes)
@@ -172,7 +182,7 @@ class _Reader:
             line=self._number(data, place, "line", 0, LINE_MAX),
         )
         if node.category not in CATEGORIES:
-            raise self._error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
+            raise self.error(f"{place}category", f"is '{node.category}', must be one of {', '.join(CATEGORIES)}")
         return node
 
     @staticmethod
@@ -187,8 +197,8 @@ class _Reader:
     def _trace(self, data: dict[str, Any]) -> Trace:
         if "trace" in data and data["trace"] is None:
             if not self._traced:
-                return Trace(base=0, extended=False, guard=None, changes_max=1, known_within_ms=0, values=(), texts=())
-            raise self._error(
+                return NO_TRACE
+            raise self.error(
                 "trace",
                 "is null: the application was built without a trace, so nothing can be watched; build it with "
                 "TRACE 0x600 (canopy_add_application) or --trace 0x600 (canopy compile)",
@@ -197,17 +207,17 @@ class _Reader:
         version = self._get(trace, where, "version", int)
         if version != VERSION:
             way_out = "use the release of Canopy that the application was built with"
-            raise self._error("trace.version", f"is {version}, these tools read {VERSION}: {way_out}")
+            raise self.error("trace.version", f"is {version}, these tools read {VERSION}: {way_out}")
         extended = self._get(trace, where, "extended", bool)
         guard = None if trace.get("guard") is None else self._number(trace, where, "guard", 0, DATA_ID_MAX)
         values = self._list(trace, where, "values", self._value)
         first = 0
         for index, value in enumerate(values):
             if value.slot != first:
-                raise self._error(f"trace.values[{index}].slot", f"is {value.slot}, must be {first}")
+                raise self.error(f"trace.values[{index}].slot", f"is {value.slot}, must be {first}")
             first += value.slots
         if first > SLOTS_MAX:
-            raise self._error("trace.values", f"take {first} slots, must be {SLOTS_MAX} at most")
+            raise self.error("trace.values", f"take {first} slots, must be {SLOTS_MAX} at most")
         return Trace(
             base=self._number(trace, where, "base", 0, (2**29 if extended else 2**11) - len(MESSAGES)),
             extended=extended,
@@ -224,11 +234,11 @@ class _Reader:
         place += "."
         kind, type_name = self._get(data, place, "kind", str), self._get(data, place, "type", str)
         if kind not in ("entry", "reason"):
-            raise self._error(f"{place}kind", f"is '{kind}', must be entry or reason")
+            raise self.error(f"{place}kind", f"is '{kind}', must be entry or reason")
         if type_name not in TYPES:
-            raise self._error(f"{place}type", f"is '{type_name}', must be one of {', '.join(TYPES)}")
+            raise self.error(f"{place}type", f"is '{type_name}', must be one of {', '.join(TYPES)}")
         if self._get(data, place, "slots", int) != TYPES[type_name]:
-            raise self._error(f"{place}slots", f"is {data['slots']}, must be {TYPES[type_name]} for {type_name}")
+            raise self.error(f"{place}slots", f"is {data['slots']}, must be {TYPES[type_name]} for {type_name}")
         node = self._number(data, place, "node", 0, self._node_count - 1) if kind == "reason" else None
         words = self._get(data, place, "enum", dict) if data.get("enum") is not None else {}
         return TraceValue(
@@ -249,12 +259,12 @@ class _Reader:
         text = self._get(data, place, "scale", str)
         number = re.fullmatch(r"\d{1,19}([.]\d{1,19}|/[1-9]\d{0,18})?", text)
         if number is None or not Fraction(text):
-            raise self._error(f"{place}scale", f"is '{text[:50]}', must be a number such as 0.01 or 1/3")
+            raise self.error(f"{place}scale", f"is '{text[:50]}', must be a number such as 0.01 or 1/3")
         return Fraction(text)
 
     def _name(self, value: Any, place: str) -> str:
         if not isinstance(value, str):
-            raise self._error(place, f"is {value!r}, must be a text")
+            raise self.error(place, f"is {value!r}, must be a text")
         return value
 
     def _list(self, data: dict[str, Any], where: str, key: str, item: Callable[[Any, str], T]) -> tuple[T, ...]:
@@ -263,22 +273,23 @@ class _Reader:
 
     def _object(self, value: Any, place: str) -> dict[str, Any]:
         if not isinstance(value, dict):
-            raise self._error(place, "must be a JSON object")
+            raise self.error(place, "must be a JSON object")
         return value
 
     def _get(self, data: dict[str, Any], where: str, key: str, kind: type[T]) -> T:
         value = data.get(key)
         if key not in data:
-            raise self._error(f"{where}{key}", "is missing")
+            raise self.error(f"{where}{key}", "is missing")
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is int):
-            raise self._error(f"{where}{key}", f"is {value!r}, must be of type {kind.__name__}")
+            raise self.error(f"{where}{key}", f"is {value!r}, must be of type {kind.__name__}")
         return value
 
     def _number(self, data: dict[str, Any], where: str, key: str, low: int, high: int) -> int:
         value = self._get(data, where, key, int)
         if not low <= value <= high:
-            raise self._error(f"{where}{key}", f"is {str(value)[:30]}, must be {low} to {high}")
+            raise self.error(f"{where}{key}", f"is {str(value)[:30]}, must be {low} to {high}")
         return value
 
-    def _error(self, place: str, text: str) -> ModelError:
+    def error(self, place: str, text: str) -> ModelError:
+        """What is wrong at a place of the file."""
         return ModelError(f"{self._path}: {place}: {text}")

@@ -67,6 +67,7 @@ def line(watch: Watch, now: float) -> str:
     return (
         f"tick {view.tick} {view.root_status.name} [{leaves}] {signals}{_values(view)}; "
         f"{_pace(watch, now)}{_bus(view)}; {_losses(view)}"
+        f"{'; THE CONTROLLER CLAIMS ANOTHER TREE' if watch.disagreement else ''}"
     )
 
 
@@ -84,7 +85,8 @@ def picture(watch: Watch, now: float, title: str, ascii_only: bool = False) -> R
             *([Panel(_value_table(view), title="values", title_align="left")] if view and view.values else []),
         ),
     )
-    return Group(styled(title, style="bold"), table, _footer(watch, now))
+    claim = [styled(watch.disagreement, style="bold red")] if watch.disagreement else []
+    return Group(styled(title, style="bold"), table, *claim, _footer(watch, now))
 
 
 def _tree(watch: Watch, silent: bool, ascii_only: bool) -> Tree:

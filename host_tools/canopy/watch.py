@@ -9,7 +9,7 @@ from typing import Any
 
 from canopy.live.codes import code_name
 from canopy.live.rest_of_tick import RestOfTick
-from canopy.model import Model, ModelError
+from canopy.model import Model
 from canopy.signals import SignalTable
 from canopy.trace import CAN_STATES, TraceDecoder, TreeView
 
@@ -36,20 +36,18 @@ class Watch:
         self._ticks: deque[tuple[float, int]] = deque()
 
     def feed(self, identifier: int, data: bytes, now: float) -> tuple[TreeView, ...]:
-        """Takes one data frame; returns the ticks it completes.
-
-        Raises:
-            ModelError: The controller says that it runs another tree than the model's.
-        """
+        """Takes one data frame; returns the ticks it completes."""
         views = self.idle(now)
         self.signals.feed(identifier, data, now)
         if identifier in self.model.trace.names:
             self._last_trace = now
         self._rest.saw(identifier, now)
-        views += self._take(self._decoder.feed(identifier, data), now)
-        if self._decoder.mismatch is not None:
-            raise ModelError(self._decoder.mismatch)
-        return views
+        return views + self._take(self._decoder.feed(identifier, data), now)
+
+    @property
+    def disagreement(self) -> str | None:
+        """Why the last CanopyModel was not the model's; None while they agree. Anybody can send one, on a bus."""
+        return self._decoder.mismatch
 
     def idle(self, now: float) -> tuple[TreeView, ...]:
         """Call this often: gives up waiting for frames of a tick that no longer come."""
@@ -57,8 +55,7 @@ class Watch:
 
     def rate(self, now: float) -> float:
         """Ticks per second over the last two seconds; 0 while it is not known."""
-        while self._ticks and now - self._ticks[0][0] > _RATE_WINDOW_S:
-            self._ticks.popleft()
+        self._forget_old_ticks(now)
         if len(self._ticks) < 2:
             return 0.0
         (first_at, first), (last_at, last) = self._ticks[0], self._ticks[-1]
@@ -92,6 +89,7 @@ class Watch:
             "lost": view.lost if view else 0,
             "refused": (view.refused if view else 0) + self.signals.refused,
             "restarts": view.restarts if view else 0,
+            "disagreement": self.disagreement,
             "crc_errors": view.crc_errors if view else 0,
             "health": asdict(view.health) if view else None,
             "bus": CAN_STATES[bus.can_state] if bus else None,
@@ -131,7 +129,12 @@ class Watch:
                 self._ticks.clear()
             self.view = view
             self._ticks.append((now, view.tick))
+        self._forget_old_ticks(now)
         return views
+
+    def _forget_old_ticks(self, now: float) -> None:
+        while self._ticks and now - self._ticks[0][0] > _RATE_WINDOW_S:
+            self._ticks.popleft()
 
     def _periods(self, count: int) -> float:
         return count * self.model.period_us / 1e6

@@ -43,7 +43,10 @@ static uint16_t search(const canopy_bus_t *bus, uint32_t wanted)
     return low < exact_count(bus) && rank_at(bus, low) == wanted ? low : bus->rx_count;
 }
 
-/** As search(). Frames that wait at the same time come in the order of their ids, so the next message is a good guess. */
+/**
+ * As search(). Frames that wait at the same time come in the order of their ids, so the next message of the table is a good
+ * guess, in each cycle from the first one on.
+ */
 static uint16_t find_exact(canopy_bus_state_t *self, uint32_t wanted)
 {
     const canopy_bus_t *bus = self->bus;
@@ -53,7 +56,7 @@ static uint16_t find_exact(canopy_bus_state_t *self, uint32_t wanted)
         index = search(bus, wanted);
     }
     if (index < bus->rx_count) {
-        self->expected = (uint16_t)(index + 1u) < exact_count(bus) ? (uint16_t)(index + 1u) : 0u;
+        self->expected = (uint16_t)(index + 1u);
     }
     return index;
 }
@@ -183,10 +186,9 @@ static void check_age(canopy_bus_state_t *self, uint16_t age_ms)
     self->check = canopy_bus_check(self->check, 0, age, sizeof age);
 }
 
-static void begin_message(canopy_bus_state_t *self, uint16_t index, canopy_time_t now)
+static void begin_message(canopy_bus_state_t *self, const canopy_rx_message_t *message, canopy_rx_state_t *state,
+                          canopy_time_t now)
 {
-    const canopy_rx_message_t *message = &self->bus->rx[index];
-    canopy_rx_state_t *state = &self->rx[index];
     canopy_time_t age = now - state->arrived_at;
     bool fresh = state->received && (message->timeout == 0u || age < message->timeout);
 
@@ -205,9 +207,13 @@ static void begin_message(canopy_bus_state_t *self, uint16_t index, canopy_time_
 
 void canopy_bus_begin_tick(canopy_bus_state_t *self, const canopy_cycle_t *cycle)
 {
-    for (uint16_t index = 0; index < self->bus->rx_count; index++) {
-        begin_message(self, index, cycle->now);
+    const canopy_bus_t *bus = self->bus;
+    const canopy_time_t now = cycle->now;
+
+    for (uint32_t index = 0; index < bus->rx_count; index++) {
+        begin_message(self, &bus->rx[index], &self->rx[index], now);
     }
+    self->expected = 0;
     self->check = canopy_bus_check(self->check, (uint32_t)cycle->can_state | (cycle->overload ? 8u : 0u), NULL, 0);
     self->bus->set_cycle(self->input, cycle);
     self->bus->reset_output(self->output);
@@ -215,8 +221,10 @@ void canopy_bus_begin_tick(canopy_bus_state_t *self, const canopy_cycle_t *cycle
 
 void canopy_bus_commit(const canopy_bus_state_t *self, canopy_tx_t *tx, uint32_t tick, canopy_time_t now)
 {
-    for (uint16_t index = 0; index < self->bus->tx_count; index++) {
-        const canopy_tx_message_t *message = &self->bus->tx[index];
+    const canopy_bus_t *bus = self->bus;
+
+    for (uint16_t index = 0; index < bus->tx_count; index++) {
+        const canopy_tx_message_t *message = &bus->tx[index];
 
         if (tick % message->every == 0u) {
             canopy_tx_post(tx, index, self->output, now + message->deadline);

@@ -64,7 +64,7 @@ canopy_can_state_t canopy_can_manager_step(canopy_can_manager_t *self, const can
             self->next = now + self->pause;
         }
         restart(self, can, now);
-    } else if (canopy_time_reached(now, self->since + CANOPY_CAN_SETTLED_US)) {
+    } else if (self->pause != 0u && canopy_time_reached(now, self->since + CANOPY_CAN_SETTLED_US)) {
         self->pause = 0;
     }
     return self->state;

@@ -222,7 +222,6 @@ static canopy_image_error_t make_tree(canopy_image_parts_t *image)
                             .parameter_count = image->parameter_count,
                             .word_count = image->word_count,
                             .hash = image->hash};
-    image->where = 0;
     return canopy_tree_validate(tree, &image->where) == CANOPY_OK ? CANOPY_IMAGE_OK : CANOPY_IMAGE_TREE;
 }
 

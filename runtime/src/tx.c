@@ -82,7 +82,7 @@ void canopy_tx_post(canopy_tx_t *self, uint16_t message, const void *output, can
     uint32_t buffer;
 
     atomic_store(&slot->latest, 0u);
-    buffer = atomic_load(&slot->reading) == 1u ? 1u : 0u;
+    buffer = atomic_load(&slot->reading) == 1u;
     self->messages[message].encode(output, canopy_tx_buffer(self, message, buffer));
     slot->until[buffer] = until;
     slot->posted = (slot->posted + 1u) & CANOPY_TX_VERSION_MAX;
@@ -133,15 +133,6 @@ void canopy_tx_trace(canopy_tx_t *self, uint32_t id, uint8_t flags, const canopy
 void canopy_tx_stop_trace(canopy_tx_t *self)
 {
     atomic_store_explicit(&self->trace_stopped, true, memory_order_relaxed);
-}
-
-void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)
-{
-    if (self->can->request != NULL) {
-        self->can->request(self->can->context);
-    } else {
-        canopy_tx_service(self, now);
-    }
 }
 
 bool canopy_tx_is_out(const canopy_tx_t *self)

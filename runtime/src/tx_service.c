@@ -84,11 +84,11 @@ static void note_aborted(canopy_tx_t *self, canopy_tx_slot_t *slot, const canopy
     }
 }
 
-/** Takes note of what has become of the frame in a mailbox. */
-static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
+/** Takes note of what has become of the frame in a mailbox, which `box` describes. */
+static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, const canopy_tx_mailbox_t *box,
+                                   canopy_time_t now)
 {
     const canopy_can_t *can = self->can;
-    canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
     canopy_can_outcome_t outcome = can->outcome(can->context, mailbox);
 
     if (outcome == CANOPY_CAN_PENDING) {
@@ -109,7 +109,7 @@ static canopy_can_outcome_t settle(canopy_tx_t *self, uint8_t mailbox, canopy_ti
             note_aborted(self, slot, box, now);
         }
     }
-    box->what = 0;
+    self->mailboxes[mailbox].what = 0;
     self->in_flight--;
     return outcome;
 }
@@ -124,7 +124,7 @@ static bool take_back(canopy_tx_t *self, uint8_t mailbox, canopy_time_t now)
     }
     box->aborting = true;
     self->can->abort(self->can->context, mailbox);
-    return settle(self, mailbox, now) != CANOPY_CAN_PENDING;
+    return settle(self, mailbox, box, now) != CANOPY_CAN_PENDING;
 }
 
 static bool trace_is_stopped(const canopy_tx_t *self)
@@ -148,7 +148,7 @@ static void collect(canopy_tx_t *self, canopy_time_t now)
     for (uint8_t mailbox = 0; mailbox < self->mailbox_count; mailbox++) {
         const canopy_tx_mailbox_t *box = &self->mailboxes[mailbox];
 
-        if (box->what == 0u || settle(self, mailbox, now) != CANOPY_CAN_PENDING) {
+        if (box->what == 0u || settle(self, mailbox, box, now) != CANOPY_CAN_PENDING) {
             continue;
         }
         if (is_void(self, box, now)) {
@@ -183,7 +183,11 @@ static uint8_t find_mailbox(canopy_tx_t *self, uint32_t what, canopy_time_t now)
 /** From now on only a newer value of the message waits. */
 static void take(canopy_tx_t *self, canopy_tx_slot_t *slot, uint32_t version)
 {
-    add(&self->replaced, (version - slot->taken - 1u) & CANOPY_TX_VERSION_MAX);
+    const uint32_t skipped = (version - slot->taken - 1u) & CANOPY_TX_VERSION_MAX;
+
+    if (skipped != 0u) {
+        add(&self->replaced, skipped);
+    }
     slot->taken = version;
 }
 
@@ -201,7 +205,7 @@ static int fly(canopy_tx_t *self, uint8_t mailbox, canopy_tx_mailbox_t box, cano
     } else {
         self->slots[box.what - 1u].flying = true;
     }
-    return settle(self, mailbox, now) != CANOPY_CAN_ABORTED ? 1 : 0;
+    return settle(self, mailbox, &box, now) != CANOPY_CAN_ABORTED ? 1 : 0;
 }
 
 /**

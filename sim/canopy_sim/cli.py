@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 import signal
 import sys
 from decimal import Decimal, InvalidOperation
@@ -13,12 +12,14 @@ from typing import Any
 import can
 import click
 
-from canopy.canbus import CanBusError, open_bus, split_spec
+from canopy.can_bus.steady import SteadyBus
+from canopy.canbus import CanBusError, split_spec
 from canopy.compiler.cli import HexNumber
 from canopy.compiler.errors import CompileError
 from canopy.escape.json_text import dumps
 from canopy.escape.terminal import CleanCommand, echo, echo_lines
 from canopy.lcm_link import DEFAULT_URL
+from canopy.process.say import Voice
 from canopy_sim.deeds import OF_WHOLE
 from canopy_sim.lcm_side import open_lcm_side
 from canopy_sim.messages import DEFAULT_TRACE, DescriptionError, RobotMessages, load_messages
@@ -205,10 +206,8 @@ def main(
         raise click.UsageError("--profile nao is for the whole robot: give --dbc examples/nao/big.dbc.")
     _check_timetable(timetable, messages)
     robot = Robot(messages, make_plant(power, posture, Profile[profile], seed))
-    # python-can logs what it also raises; one line is enough.
-    logging.getLogger("can").setLevel(logging.CRITICAL)
     try:
-        bus = open_bus(bus_name)
+        bus = SteadyBus(bus_name, Voice("canopy-sim"), create=True)
     except CanBusError as error:
         echo(f"canopy-sim: {error}", err=True)
         sys.exit(1)

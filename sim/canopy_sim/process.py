@@ -14,7 +14,6 @@ A person at a desk may let the robot's clock stand, let it make single steps, an
 
 from __future__ import annotations
 
-import errno
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -57,8 +56,6 @@ RENUMBER_AFTER = 8
 A controller answers a number once. When that answer was lost, or the simulator was started again at the number that it
 had left off at, no repeat would ever be answered.
 """
-
-SEND_BUFFER_FULL = {errno.ENOBUFS, errno.EAGAIN}
 
 
 class BusGoneError(Exception):
@@ -104,7 +101,7 @@ class Simulation:
     timetable: list[Event] = field(default_factory=list)
     sent: int = 0
     dropped: int = 0
-    """Frames that found the bus's transmit buffer full."""
+    """Frames that found the bus's transmit buffer full, or the bus away, or that the system could not send."""
     received: int = 0
     slips: int = 0
     """Real time: cycles skipped because the process came more than a period late."""
@@ -269,7 +266,8 @@ class Simulation:
         try:
             self.bus.send(frame)
         except can.CanError as error:
-            if error.error_code not in SEND_BUFFER_FULL and "buffer full" not in str(error):
+            # An error of the system passes: the next frame may do better. Without one, no bus can carry the frame.
+            if error.error_code is None and "buffer full" not in str(error):
                 raise BusGoneError(f"cannot send on {self.bus.channel_info}: {error}") from error
             self.dropped += 1
         except OSError as error:

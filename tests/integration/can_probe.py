@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -11,9 +12,14 @@ from types import TracebackType
 class CanProbe:
     """A running can_probe. Frames are written as cansend writes them: ``123#1122``."""
 
-    def __init__(self, program: Path, spec: str, *options: str) -> None:
+    def __init__(self, program: Path, spec: str, *options: str, environment: Mapping[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
-            [program, spec, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [program, spec, *options],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
         )
         assert self.process.stdin is not None
         assert self.process.stdout is not None

@@ -129,7 +129,8 @@ class Engine:
 
     def status(self, index: int) -> int:
         """What the node returned in the last tick that ticked it."""
-        return self._status[index] & 7
+        kept = self._status[index] & 15  # canopy/status_code.h: the result + 6; RUNNING that was halted has lost 4
+        return RUNNING if kept == 3 else max(kept - 6, IDLE)
 
     def called(self, what: str | None = None) -> list[str]:
         """Names of the leaves called in the last tick, in order; `what`: tick, running or halt only."""

@@ -13,12 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from canopy.compiler.bounds import Others, make_bounds
-from canopy.compiler.bus_reader import read_bus
-from canopy.compiler.bus_timing import trace_frames
+from canopy.compiler.bounds import Others
+from canopy.compiler.emit import load_application
+from canopy.compiler.trace import TraceOptions
 
-DBC = Path(__file__).resolve().parents[2] / "examples" / "nao" / "nao.dbc"
-PERIOD_MS, BITRATE, BURST, LATENCY_US, CHANGES_MAX = 50, 500_000, 10, 50, 2
+NAO = Path(__file__).resolve().parents[2] / "examples" / "nao"
+PERIOD_MS, BITRATE, BURST, LATENCY_US = 50, 500_000, 10, 50
 TIMEOUT_US = 500_000
 LOADS = (0, 30, 60, 90)
 CUTS = 3
@@ -58,9 +58,10 @@ class Measured:
 
 def bounds_at(load: int) -> Bounds:
     """The compiler's bounds for nao_power's Battery and PowerCommand."""
-    bus = read_bus(DBC, "Controller", PERIOD_MS)
-    others = Others(load, BURST if load else 0, LATENCY_US)
-    bounds = make_bounds(bus, BITRATE, others, trace_frames(bus, CHANGES_MAX))
+    tree, dbc = NAO / "trees" / "power_supply.xml", NAO / "nao.dbc"
+    others, trace = Others(load, BURST if load else 0, LATENCY_US), TraceOptions(0x600)
+    application = load_application("nao_power", tree, dbc, "Controller", PERIOD_MS, BITRATE, others=others, trace=trace)
+    bounds = application.budget.bounds
     age = next(bound.age_us for bound in bounds.inputs if bound.name == "Battery")
     safe = next(bound.safe_us for bound in bounds.outputs if bound.name == "PowerCommand")
     assert age is not None

@@ -187,13 +187,13 @@ def test_the_model_of_another_tree_is_one_line_with_a_way_out(
     tmp_path: Path, bus_dir: Path, bus: can.BusABC, tool: str
 ) -> None:
     source, model = TraceSource(4), write_model(tmp_path)
-    command = [sys.executable, "-m", "canopy", tool, "--model", str(model), "--can", SPEC]
+    command = [sys.executable, "-m", "canopy", tool, "--model", str(model), "--can", SPEC, "--duration", "2"]
     with Process([*NO_ROUTE, *command]) as watcher:
         wait_for_participants(bus_dir, 2)
         send(bus, [source.model(0x01234567, 4), *source.frames([1, 0, 0, 0]), source.model(0x01234567, 5)])
         _, errors = watcher.end(None)
-    assert watcher.popen.returncode == 1
-    line = errors.splitlines()[-1]
+    assert watcher.popen.returncode == 0  # anybody can send one: it is shown, and ends nothing
+    line = next(line for line in errors.splitlines() if "is not the model" in line)
     assert line.startswith(
         f"canopy {tool}: {model}: is not the model of the tree that the controller runs: that one has "
     )

@@ -56,8 +56,8 @@ def test_room_for_the_trace_is_stated_in_ticks(tmp_path: Path) -> None:
     tree, dbc, period = APPLICATIONS["nao_home"]
     arguments = ["compile", str(ROOT / tree), "--name", "nao_home", "--dbc", str(ROOT / dbc), "--node", "Controller"]
     arguments += ["--period-ms", str(period), "-o", str(tmp_path)]
-    printed = CliRunner().invoke(main, arguments).output
-    assert re.search(r"^  trace +768 bytes of the RAM, room for 4 ticks without a bus$", printed, re.MULTILINE)
+    printed = CliRunner().invoke(main, [*arguments, "--trace", "0x600"]).output
+    assert re.search(r"^  trace .* bytes of RAM, room for 4 ticks without a bus$", printed, re.MULTILINE)
     sizes = {}
     for ticks in (1, 2, 4, 20, 21):
         options = [*arguments, "--json", "--trace", "0x600", "--trace-ticks", str(ticks)]
@@ -77,7 +77,7 @@ def test_room_for_the_trace_is_stated_in_ticks(tmp_path: Path) -> None:
 def test_each_kind_of_node_has_a_price(tmp_path: Path) -> None:
     tree, dbc, period = APPLICATIONS["features"]
     arguments = ["compile", str(ROOT / tree), "--name", "features", "--dbc", str(ROOT / dbc), "--node", "Controller"]
-    arguments += ["--period-ms", str(period), "-o", str(tmp_path), "--include", "state.h"]
+    arguments += ["--period-ms", str(period), "-o", str(tmp_path), "--include", "state.h", "--trace", "0x600"]
     budget = json.loads(CliRunner().invoke(main, [*arguments, "--json"]).output)
     assert sum(cost["nodes"] for cost in budget["kinds"]) == budget["nodes"]
     timeout = next(cost for cost in budget["kinds"] if cost["kind"] == "Timeout")

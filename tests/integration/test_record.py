@@ -186,7 +186,7 @@ def test_a_file_that_is_there_is_kept(bus: str, tmp_path: Path) -> None:
     assert output.read_text() == "precious"
     with Record(bus, output, "--force", "--duration", "0.2") as record:
         out, _ = record.process.communicate(timeout=60)
-    assert (record.process.returncode, json.loads(out)["frames"], output.read_text()) == (0, 0, "")
+    assert (record.process.returncode, json.loads(out)["frames"], output.read_text()) == (1, 0, "")
 
 
 @pytest.mark.parametrize(
@@ -219,8 +219,8 @@ def test_a_full_disk_is_told(bus: str, sender: can.BusABC, tmp_path: Path) -> No
         for number in range(2000):
             sender.send(logs.frame(0x200, number.to_bytes(2, "little")))
         out, err = record.process.communicate(timeout=60)
-    assert (record.process.returncode, out) == (1, "")
-    assert err.endswith(f"canopy record: [Errno {28}] No space left on device\n"), err
+    assert (record.process.returncode, out) == (3, "")
+    assert f"canopy record: {output}: [Errno {28}] No space left on device" in err.splitlines()[-1], err
 
 
 # --- what it tells ----------------------------------------------------------------------------------------------------
@@ -244,7 +244,7 @@ def test_another_controllers_model_is_said_but_the_record_goes_on(bus: str, send
         sender.send(logs.frame(0x607, bytes.fromhex("2078563412070000")))
         sender.send(logs.frame(0x123))
         data = record.end()
-    assert (record.process.returncode, data["frames"]) == (1, 2)
+    assert (record.process.returncode, data["frames"], data["disagreements"]) == (0, 2, 1)
     assert "is not the model of the tree that the controller runs: that one has 7 nodes and the hash 12345678…" in (
         record.said
     )

@@ -309,15 +309,19 @@ def test_bus_that_is_not_there_ends_with_1_and_one_line() -> None:
     assert "unixbus:bus0" in done.stderr
 
 
-def test_bus_that_goes_away_ends_with_1_and_a_summary(bus: str, bus_dir: Path) -> None:
+def test_bus_that_goes_away_is_made_anew(bus: str, bus_dir: Path) -> None:
     with Simulator(bus, "--no-lcm") as simulator:
         with Controller(bus) as controller:
             controller.receive_message("Posture")
         shutil.rmtree(bus_dir / "bus0")
+        with Controller(bus) as controller:
+            controller.receive_message("Posture")
+        simulator.process.send_signal(signal.SIGINT)
         out, err = simulator.process.communicate(timeout=10)
-    assert simulator.process.returncode == 1
-    assert json.loads(out)["ended_by"] == "failure"
-    assert "cannot send" in err
+    assert simulator.process.returncode == 0
+    data = json.loads(out)
+    assert (data["ended_by"], data["bus"]["outages"]) == ("signal", 1)
+    assert err.count("waiting for it") == err.count("is there after") == 1
 
 
 @pytest.mark.parametrize(

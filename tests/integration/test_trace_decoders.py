@@ -35,7 +35,7 @@ def a_model(digest: str, nodes: int, slots: int, changes_max: int, guard: int) -
     values = tuple(
         TraceValue("entry", f"entry{slot}", "", None, "uint32_t", slot, Fraction(1), "", {}) for slot in range(slots)
     )
-    trace = Trace(BASE, False, None if guard < 0 else guard, changes_max, 0, values, ())
+    trace = Trace(BASE, False, None if guard < 0 else guard, 4, changes_max, 0, values, ())
     return Model(
         path=Path("trial.model.json"),
         application="trial",

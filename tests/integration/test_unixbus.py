@@ -18,7 +18,8 @@ from pathlib import Path
 import can
 import pytest
 
-from canopy.unixbus import UnixBus, buses_folder, decode, encode
+from canopy.can_bus.folder import buses_folder
+from canopy.unixbus import UnixBus, decode, encode
 from integration.can_probe import CanProbe
 
 FRAMES = {
@@ -118,17 +119,18 @@ def test_error_frames_are_counted_and_handed_over_on_request(bus: can.BusABC, pr
 
 
 def test_many_frames_in_order_without_a_loss(bus: can.BusABC, probe_program: Path) -> None:
-    count = 1500  # fits into the C driver's queue
+    burst, bursts = 250, 6
     with CanProbe(probe_program, "unixbus:bus0") as probe:
-        for i in range(count):
-            bus.send(standard(i))
-        for i in range(count):
-            assert probe.receive() == f"{i:03X}#"
-        assert probe.ask(f"burst {count} 123#") == f"taken {count} full 0 failed 0"
-        assert all(bus.recv(5) is not None for _ in range(count))
+        for first in range(0, burst * bursts, burst):
+            for i in range(first, first + burst):
+                bus.send(standard(i))
+            for i in range(first, first + burst):
+                assert probe.receive() == f"{i:03X}#"
+            assert probe.ask(f"burst {burst} 123#") == f"taken {burst} full 0 failed 0"
+            assert all(bus.recv(5) is not None for _ in range(burst))
         assert probe.stats()["rx_dropped"] == probe.stats()["tx_dropped"] == 0
     assert isinstance(bus, UnixBus)
-    assert bus.counters == {"sent": count, "tx_dropped": 0, "rx_dropped": 0, "malformed": 0}
+    assert bus.counters == {"sent": burst * bursts, "tx_dropped": 0, "rx_dropped": 0, "malformed": 0}
 
 
 def test_own_messages_on_request(bus: can.BusABC) -> None:
@@ -192,15 +194,18 @@ def test_stopped_participant_does_not_stall_a_python_sender(
             bus.send(standard(0x123))
         took = time.monotonic() - start
         assert isinstance(bus, UnixBus)
-        dropped = bus.counters["tx_dropped"]
-        assert 0 < dropped < 500
-        assert 0.09 <= took < 5.0  # one wait, and no second one
+        assert took < 2.0
         for _ in range(500):
             assert peer.recv(5) is not None  # the others have lost nothing
+        assert peer.counters["rx_dropped"] == 0
+        wait_for(lambda: bus.counters["tx_dropped"] > 450)  # what does not come soon does not come
+        dropped = bus.counters["tx_dropped"]
         stopped.process.send_signal(signal.SIGCONT)
         assert all(stopped.receive() == "123#" for _ in range(500 - dropped))
-        bus.send(standard(0x124))
-        assert stopped.receive() == "124#"
+        for _ in range(3):  # each tells of at most 255
+            bus.send(standard(0x124))
+            assert stopped.receive() == "124#"
+        assert stopped.stats()["rx_dropped"] == dropped == bus.counters["tx_dropped"]
 
 
 def test_participant_that_never_reads_does_not_stall_a_c_sender(
@@ -212,13 +217,16 @@ def test_participant_that_never_reads_does_not_stall_a_c_sender(
     ):
         start = time.monotonic()
         assert probe.ask("burst 500 123#") == "taken 500 full 0 failed 0"  # taken by `bus`
-        assert 0.09 <= time.monotonic() - start < 5.0
+        assert time.monotonic() - start < 2.0
+        time.sleep(0.25)
         deaf.setblocking(False)
         taken = 0
         with pytest.raises(BlockingIOError):
             while deaf.recv(100):
                 taken += 1
         assert probe.stats()["tx_dropped"] == 500 - taken
+        for _ in range(500):
+            assert bus.recv(5) is not None
 
 
 def test_send_with_a_timeout(bus: can.BusABC, bus_dir: Path) -> None:
@@ -237,7 +245,7 @@ def test_send_with_a_timeout(bus: can.BusABC, bus_dir: Path) -> None:
 
 def test_malformed_datagrams_are_counted(bus: can.BusABC, probe_program: Path) -> None:
     good = encode(standard(0x123, b"\x11\x22"))
-    changes = [(0, 2), (1, 64), (1, 16), (2, 3), (2, 1), (2, 9), (3, 1), (5, 8)]
+    changes = [(0, 2), (1, 64), (1, 16), (2, 3), (2, 1), (2, 9), (5, 8)]
     bad = [good[:place] + bytes([value]) + good[place + 1 :] for place, value in changes]
     bad += [good[:size] for size in range(len(good))] + [good + b"\0", bytes(200)]
     with CanProbe(probe_program, "unixbus:bus0") as probe, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:

@@ -132,6 +132,7 @@ def test_it_compiles_and_so_does_its_c(tmp_path: Path, name: str) -> None:
         ('<Script code="RED := 3"/>', PAINT + COLORS, ["'RED' is a value of an enum"]),
         ('<ScriptCondition code="x == BLUE"/>', "", ["<Enum> in <TreeNodesModel>"]),
         ("<A v='json:{&quot;x&quot;:1}'/>", action("A", port("v", "point_t")), ["unsupported type 'point_t'"]),
+        ('<TestNode return_status_script="SUCCESS"/>', "", ["return_status_script is not supported"]),
         ("<AlwaysSuccess/>", '<Enum ID="C"/>', ["needs an ID and values"]),
         ("<AlwaysSuccess/>", '<Enum ID="C"><value name="A"/><value name="A"/></Enum>', ["each once"]),
         ("<AlwaysSuccess/>", '<Enum ID="C"><value name="A" number="x"/></Enum>', ["not a whole number"]),

@@ -33,7 +33,7 @@ ANY_TABLE = ["-eva-slevel", "2", "-eva-domains", "cvalue,equality,symbolic-locat
 ANY_TABLE += ["-eva-split-return-function", "canopy_tree_init:0,canopy_tree_validate:0"]
 # main() may mix its states: which hooks there are is one state. A mailbox is looked at by itself.
 LOOP = ["-eva-slevel", "20", "-eva-split-return-function", "receive:full,copy:0,find_mailbox:full,settle:full"]
-LOOP += ["-eva-slevel-function", "send_changes:2000,main:0,find_mailbox:500,collect:500", "-eva-min-loop-unroll", "4"]
+LOOP += ["-eva-slevel-function", "main:0,find_mailbox:500,collect:500", "-eva-min-loop-unroll", "4"]
 
 
 @dataclass

@@ -353,8 +353,29 @@ static void ages_are_whole_milliseconds_rounded_up(void)
     TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65533001));
     TEST_ASSERT_EQUAL_UINT16(65534, speed_age_of(65534000));
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65534001));
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65535001)); /* 0 in 16 bits */
+    TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(65536000));
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of(UINT64_C(1) << 32)); /* 0 in 32 bits */
     TEST_ASSERT_EQUAL_UINT16(CANOPY_AGE_MAX, speed_age_of((UINT64_C(1) << 32) + 1000u));
+}
+
+/* However long its timeout: when it was sent is not known any more. */
+static void a_value_whose_age_cannot_be_told_is_not_fresh(void)
+{
+    const canopy_time_t now = UINT64_C(1) << 40;
+    const canopy_rx_message_t patient[] = {
+        {.id = SPEED_ID, .length = 3, .data_id = 1, .timeout = 100000000, .decode = decode_speed, .set_age = speed_age},
+        rx[1]};
+    canopy_bus_t patient_tables = tables;
+
+    patient_tables.rx = patient;
+    bus.bus = &patient_tables;
+    receive_late(speed_frame(0, 42), now - 65534000, now);
+    begin_tick(now);
+    TEST_ASSERT_TRUE(input.speed_fresh);
+    receive_late(speed_frame(1, 42), now - 65534001, now);
+    begin_tick(now);
+    TEST_ASSERT_FALSE(input.speed_fresh);
 }
 
 static void a_frame_that_came_after_the_cycle_began_has_the_age_0(void)
@@ -540,6 +561,7 @@ int main(void)
     RUN_TEST(each_message_has_its_own_deadline_after_the_tick);
     RUN_TEST(all_messages_can_be_posted_with_one_deadline);
     RUN_TEST(ages_are_whole_milliseconds_rounded_up);
+    RUN_TEST(a_value_whose_age_cannot_be_told_is_not_fresh);
     RUN_TEST(a_frame_that_came_after_the_cycle_began_has_the_age_0);
     RUN_TEST(timeouts_count_from_the_wire_not_from_the_drain);
     RUN_TEST(what_is_rounded_up_is_never_called_fresher_than_it_is);

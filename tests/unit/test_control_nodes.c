@@ -265,13 +265,36 @@ static void the_else_branch_may_be_missing(void)
     EXPECT("SR", CANOPY_RUNNING, "ab");
 }
 
+static void children_are_idle(void)
+{
+    for (uint16_t node = 1; node < bench.tree.node_count; node++) {
+        TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, node));
+    }
+}
+
+static void a_sequence_that_completes_later_leaves_its_children_idle(void)
+{
+    start_three_actions(CANOPY_NODE_SEQUENCE);
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("SSS", CANOPY_SUCCESS, "b'c");
+    children_are_idle();
+    EXPECT("SRS", CANOPY_RUNNING, "ab");
+    EXPECT("SFS", CANOPY_FAILURE, "b'");
+    children_are_idle();
+}
+
 static void try_catch_fails_after_its_handler(void)
 {
     start_three_actions(CANOPY_NODE_TRY_CATCH);
     EXPECT("SSS", CANOPY_SUCCESS, "ab");
+    children_are_idle();
     EXPECT("SRS", CANOPY_RUNNING, "ab");
     EXPECT("SFR", CANOPY_RUNNING, "b'c");
     EXPECT("SSS", CANOPY_FAILURE, "c'");
+    children_are_idle();
+    EXPECT("FSR", CANOPY_RUNNING, "ac");
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 1));
+    EXPECT("SSF", CANOPY_FAILURE, "c'");
     EXPECT("FSF", CANOPY_FAILURE, "ac");
     EXPECT("KSS", CANOPY_SUCCESS, "ab");
     EXPECT("KKS", CANOPY_SKIPPED, "ab");
@@ -414,6 +437,7 @@ int main(void)
     RUN_TEST(if_then_else_asks_once);
     RUN_TEST(while_do_else_asks_every_tick_and_halts_the_other_branch);
     RUN_TEST(the_else_branch_may_be_missing);
+    RUN_TEST(a_sequence_that_completes_later_leaves_its_children_idle);
     RUN_TEST(try_catch_fails_after_its_handler);
     RUN_TEST(try_catch_may_tick_its_handler_when_it_is_halted);
     RUN_TEST(a_halt_goes_deepest_first_and_once);

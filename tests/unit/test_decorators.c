@@ -125,6 +125,7 @@ static void repeat_makes_one_cycle_a_tick(void)
 {
     start_decorator(CANOPY_NODE_REPEAT, &three);
     EXPECT("S", CANOPY_RUNNING, "a");
+    TEST_ASSERT_EQUAL(CANOPY_IDLE, canopy_tree_status(&bench.instance, 1)); /* ready for the next cycle */
     EXPECT("R", CANOPY_RUNNING, "a");
     EXPECT("S", CANOPY_RUNNING, "a'");
     EXPECT("K", CANOPY_SKIPPED, "a");

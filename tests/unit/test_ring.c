@@ -39,6 +39,10 @@ static void test_init_refuses_bad_arguments(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, 0));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, 3));
     TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT, canopy_ring_init(&ring, storage, sizeof storage, 4, UINT32_MAX));
+    /* The largest ring there can be. Its storage is not looked at. */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_ring_init(&ring, storage, (size_t)1 << 31, 1, UINT32_C(1) << 31));
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_ARGUMENT,
+                      canopy_ring_init(&ring, storage, ((size_t)1 << 31) - 1u, 1, UINT32_C(1) << 31));
 }
 
 static void test_init_refuses_too_little_storage_also_where_the_product_overflows(void)

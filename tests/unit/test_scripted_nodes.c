@@ -353,6 +353,8 @@ static void the_validator_refuses_scripts_and_statuses_that_are_none(void)
     static const int32_t idle[] = {0, CANOPY_IDLE, 0, 0, 0, 0, 0, 0};
     static const int32_t no_status[] = {0, 5, 0, 0, 0, 0, 0, 0};
     static const int32_t test_of_none[] = {CANOPY_SUCCESS, 0, 0, 0, 8, 0, 0, 0};
+    static const int32_t first_of_none[] = {CANOPY_SUCCESS, 0, 8, 0, 0, 0, 0, 0};
+    static const int32_t long_delay[] = {CANOPY_SUCCESS, 5000, 0, 0, 0, 0, 0, 0};
     static const canopy_node_t test_node[] = {INNER(TEST_NODE, 0, 1, 0, 0)};
 
     start_decorator(CANOPY_NODE_ATTRIBUTES, all_scripts, 8);
@@ -370,6 +372,10 @@ static void the_validator_refuses_scripts_and_statuses_that_are_none(void)
     TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
     bench.tree.parameters = test_of_none;
     TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
+    bench.tree.parameters = first_of_none;
+    TEST_ASSERT_EQUAL(CANOPY_ERROR_TREE, canopy_tree_validate(&bench.tree, NULL));
+    bench.tree.parameters = long_delay; /* is no script's number */
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_tree_validate(&bench.tree, NULL));
     bench.tree.control_count = 0;
     refuses(all_scripts, CANOPY_NODE_USER_DECORATOR);
 }

@@ -3,141 +3,7 @@
  * @file
  * The unixbus driver against itself and against bare sockets that keep to the protocol, or do not.
  */
-#include <dirent.h>
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
-#include <time.h>
-#include <unistd.h>
-
-#include "canopy/can/unixbus.h"
-#include "unity.h"
-
-#define SECOND_US 1000000u
-
-static canopy_unixbus_t a, b;
-static char base[64];
-static char folder[80]; /* of the bus "bus0" */
-
-void setUp(void)
-{
-    (void)snprintf(base, sizeof base, "/tmp/canopy-test-XXXXXX");
-    TEST_ASSERT_NOT_NULL(mkdtemp(base));
-    TEST_ASSERT_EQUAL(0, setenv("CANOPY_BUS_DIR", base, 1)); /* NOLINT(concurrency-mt-unsafe): no thread yet */
-    (void)snprintf(folder, sizeof folder, "%s/bus0", base);
-    a.socket = -1;
-    b.socket = -1;
-}
-
-/** Calls visit for each file of the bus's folder, if it is given. @return their number */
-static unsigned each_file(void (*visit)(const char *path))
-{
-    unsigned count = 0;
-    DIR *directory = opendir(folder);
-    if (directory == NULL) {
-        return 0;
-    }
-    const struct dirent *entry;
-    while ((entry = readdir(directory)) != NULL) { /* NOLINT(concurrency-mt-unsafe): the stream is ours alone */
-        if (entry->d_name[0] != '.') {
-            char path[400];
-            (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-            count++;
-            if (visit != NULL) {
-                visit(path);
-            }
-        }
-    }
-    (void)closedir(directory);
-    return count;
-}
-
-static void delete_file(const char *path)
-{
-    (void)unlink(path);
-}
-
-void tearDown(void)
-{
-    canopy_unixbus_close(&a);
-    canopy_unixbus_close(&b);
-    (void)each_file(delete_file);
-    (void)rmdir(folder);
-    (void)rmdir(base);
-}
-
-static void open_bus(canopy_unixbus_t *bus, const canopy_can_acceptance_t *acceptance)
-{
-    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_unixbus_open(bus, "bus0", acceptance));
-}
-
-static int send_id(canopy_unixbus_t *bus, uint32_t id)
-{
-    const canopy_can_frame_t frame = {.id = id, .length = 1, .data = {(uint8_t)id}};
-    return bus->can.send(bus->can.context, 0, &frame);
-}
-
-static canopy_can_frame_t receive_waiting(canopy_unixbus_t *bus)
-{
-    canopy_can_frame_t frame = {0};
-    TEST_ASSERT_EQUAL_MESSAGE(1, bus->can.wait(bus->can.context, 10 * SECOND_US), "no frame came");
-    TEST_ASSERT_EQUAL(1, bus->can.receive(bus->can.context, &frame));
-    return frame;
-}
-
-static void expect_silence(canopy_unixbus_t *bus)
-{
-    canopy_can_frame_t frame;
-    TEST_ASSERT_EQUAL(0, bus->can.wait(bus->can.context, 20000));
-    TEST_ASSERT_EQUAL(0, bus->can.receive(bus->can.context, &frame));
-}
-
-static canopy_can_stats_t stats(canopy_unixbus_t *bus)
-{
-    canopy_can_stats_t result;
-    bus->can.stats(bus->can.context, &result);
-    return result;
-}
-
-static double seconds(void)
-{
-    struct timespec now;
-    TEST_ASSERT_EQUAL(0, clock_gettime(CLOCK_MONOTONIC, &now));
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-static int new_socket(void)
-{
-    const int descriptor = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (descriptor < 0) {
-        perror("socket");
-        abort();
-    }
-    return descriptor;
-}
-
-/** A participant without a driver: a bound socket that nobody reads. */
-static int bare_socket(const char *name)
-{
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    const int descriptor = new_socket();
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/%s", folder, name);
-    TEST_ASSERT_EQUAL(0, bind(descriptor, (const struct sockaddr *)&address, sizeof address));
-    return descriptor;
-}
-
-/** Sends bytes as they are to the driver `a`. */
-static void send_bytes(const void *bytes, size_t size)
-{
-    const int descriptor = new_socket();
-    TEST_ASSERT_EQUAL((ssize_t)size,
-                      sendto(descriptor, bytes, size, 0, (const struct sockaddr *)&a.folder.own, sizeof a.folder.own));
-    (void)close(descriptor);
-}
+#include "unixbus_folder.h"
 
 static void test_frames_go_both_ways_and_not_to_the_sender(void)
 {
@@ -225,7 +91,7 @@ static void test_malformed_datagrams_are_counted_and_change_nothing(void)
     static const struct {
         uint8_t place;
         uint8_t value;
-    } changes[] = {{0, 2}, {1, 64}, {1, CANOPY_CAN_BITRATE_SWITCH}, {2, 3}, {2, 1}, {2, 9}, {3, 1}, {5, 8}};
+    } changes[] = {{0, 2}, {1, 64}, {1, CANOPY_CAN_BITRATE_SWITCH}, {2, 3}, {2, 1}, {2, 9}, {5, 8}};
     uint8_t bytes[200] = {0};
     uint32_t count = 0;
     open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
@@ -308,77 +174,6 @@ static void test_socket_of_a_dead_participant_is_removed_and_other_files_are_not
     TEST_ASSERT_EQUAL_UINT32(0, stats(&a).tx_dropped);
 }
 
-static void test_full_participant_costs_one_wait_until_it_takes_frames_again(void)
-{
-    uint8_t bytes[100];
-    uint32_t taken = 0;
-    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
-    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
-    const int peer = bare_socket("1-00c0ffee.sock");
-
-    const double start = seconds();
-    for (uint32_t i = 0; i < 1000; i++) {
-        TEST_ASSERT_EQUAL(1, send_id(&a, 0x100)); /* taken by b all the while */
-        (void)receive_waiting(&b);
-    }
-    const double first = seconds() - start;
-    TEST_ASSERT_TRUE_MESSAGE(first >= 0.09, "did not wait for the full participant");
-    TEST_ASSERT_TRUE_MESSAGE(first < 5.0, "waited again for a participant that stayed full");
-
-    while (recv(peer, bytes, sizeof bytes, MSG_DONTWAIT) > 0) {
-        taken++;
-    }
-    TEST_ASSERT_EQUAL_UINT32(1000, taken + stats(&a).tx_dropped);
-    TEST_ASSERT_GREATER_THAN_UINT32(0, taken);
-
-    TEST_ASSERT_EQUAL(1, send_id(&a, 0x200));
-    TEST_ASSERT_GREATER_THAN(0, recv(peer, bytes, sizeof bytes, MSG_DONTWAIT));
-    TEST_ASSERT_FALSE(a.folder.peers[0].slow || a.folder.peers[1].slow);
-    (void)close(peer);
-}
-
-static void test_several_full_participants_cost_one_wait_together(void)
-{
-    int peers[8];
-    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
-    for (unsigned i = 0; i < 8; i++) {
-        char name[32];
-        (void)snprintf(name, sizeof name, "%u-00c0ffee.sock", i);
-        peers[i] = bare_socket(name);
-    }
-    double longest = 0;
-    unsigned refused = 0;
-    for (unsigned i = 0; i < 40; i++) {
-        const double start = seconds();
-        refused += send_id(&a, 1) == 0;
-        longest = seconds() - start > longest ? seconds() - start : longest;
-    }
-    TEST_ASSERT_TRUE_MESSAGE(longest < 0.5, "one send waited for each of the full participants");
-    TEST_ASSERT_GREATER_THAN_UINT32(0, refused);
-    TEST_ASSERT_EQUAL_UINT32(40, refused + stats(&a).sent);
-    for (unsigned i = 0; i < 8; i++) {
-        (void)close(peers[i]);
-    }
-}
-
-static void test_loop_that_does_not_receive_loses_the_newest_and_counts(void)
-{
-    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
-    open_bus(&b, CANOPY_CAN_ACCEPT_EVERYTHING);
-    for (uint32_t i = 0; i < CANOPY_UNIXBUS_FRAMES + 100u; i++) {
-        TEST_ASSERT_EQUAL(1, send_id(&a, i & 0x7FFu));
-    }
-    for (int tries = 0; stats(&b).rx_dropped < 100u && tries < 5000; tries++) {
-        (void)nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
-    }
-    TEST_ASSERT_EQUAL_UINT32(100, stats(&b).rx_dropped);
-    TEST_ASSERT_EQUAL_UINT32(CANOPY_UNIXBUS_FRAMES, stats(&b).rx_high_water);
-    for (uint32_t i = 0; i < CANOPY_UNIXBUS_FRAMES; i++) {
-        TEST_ASSERT_EQUAL_HEX32(i & 0x7FFu, receive_waiting(&b).id);
-    }
-    expect_silence(&b);
-}
-
 static void test_wait_lasts_as_long_as_asked(void)
 {
     open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
@@ -443,22 +238,6 @@ static void test_a_folder_that_cannot_be_made_again_stays_gone(void)
     TEST_ASSERT_EQUAL(0, unlink(folder));
     a.can.restart(a.can.context);
     TEST_ASSERT_EQUAL(CANOPY_CAN_CONTROLLER_ACTIVE, state(&a));
-}
-
-static void test_a_frame_that_nobody_took_is_not_out(void)
-{
-    unsigned taken = 0;
-    open_bus(&a, CANOPY_CAN_ACCEPT_EVERYTHING);
-    const int peer = bare_socket("1-00c0ffee.sock");
-
-    while (taken < 10000u && send_id(&a, 1) == 1) {
-        taken++;
-    }
-    TEST_ASSERT_EQUAL(0, send_id(&a, 1));
-    TEST_ASSERT_EQUAL_UINT32(taken, stats(&a).sent);
-    TEST_ASSERT_EQUAL_UINT32(0, stats(&a).tx_dropped); /* it may be offered again */
-    (void)close(peer);
-    TEST_ASSERT_EQUAL(1, send_id(&a, 1)); /* nobody is there: nobody misses it */
 }
 
 static void test_frames_say_when_they_were_sent(void)
@@ -540,14 +319,10 @@ int main(void)
     RUN_TEST(test_frame_that_no_bus_can_carry_is_refused);
     RUN_TEST(test_newcomers_are_reached_at_once);
     RUN_TEST(test_socket_of_a_dead_participant_is_removed_and_other_files_are_not);
-    RUN_TEST(test_full_participant_costs_one_wait_until_it_takes_frames_again);
-    RUN_TEST(test_several_full_participants_cost_one_wait_together);
-    RUN_TEST(test_loop_that_does_not_receive_loses_the_newest_and_counts);
     RUN_TEST(test_wait_lasts_as_long_as_asked);
     RUN_TEST(test_deleted_folder_is_told);
     RUN_TEST(test_a_folder_that_is_gone_is_made_again);
     RUN_TEST(test_a_folder_that_cannot_be_made_again_stays_gone);
-    RUN_TEST(test_a_frame_that_nobody_took_is_not_out);
     RUN_TEST(test_frames_say_when_they_were_sent);
     RUN_TEST(test_a_filter_leaves_nothing_unknown);
     RUN_TEST(test_close_removes_the_socket_and_can_be_repeated);

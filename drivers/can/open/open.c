@@ -40,6 +40,9 @@ static const char *unixbus_advice(canopy_error_t error, int number)
     if (number == ENAMETOOLONG) {
         return "the folder's path is too long for a socket; set CANOPY_BUS_DIR to a shorter one";
     }
+    if (number == EUSERS) {
+        return "the bus has 320 participants, the most that a bus can have; end one of them: `canopy buses` lists them";
+    }
     switch (error) {
     case CANOPY_ERROR_NOT_FOUND:
         return "the folder in which the bus shall lie does not exist; make it, or set CANOPY_BUS_DIR to one that does";

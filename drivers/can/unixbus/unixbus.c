@@ -12,24 +12,25 @@
 #include <string.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/time.h>
 #include <unistd.h>
 
 #include "unixbus_internal.h"
 
-enum { LOOK_MS = 100 };
+enum { LOOK_US = 100000, RETRY_US = 10000 };
 
-static int64_t monotonic_us(void)
-{
-    return canopy_arrival_monotonic() / 1000;
-}
-
-/* Cannot fail but by overflow of the 64-bit count, and then the waiter is awake already. */
-static void wake_loop(const canopy_unixbus_t *self)
+/* Counting up an eventfd cannot fail but by overflow of the 64-bit count, and then the waiter is awake already. */
+static void count_up(int event)
 {
     const uint64_t one = 1;
-    const ssize_t written = write(self->event, &one, sizeof one);
+    const ssize_t written = write(event, &one, sizeof one);
     (void)written;
+}
+
+static void clear(int event)
+{
+    uint64_t events;
+    const ssize_t cleared = read(event, &events, sizeof events);
+    (void)cleared;
 }
 
 static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_t size, int64_t arrived)
@@ -39,12 +40,13 @@ static void take_datagram(canopy_unixbus_t *self, const uint8_t *datagram, size_
         atomic_fetch_add_explicit(&self->malformed, 1u, memory_order_relaxed);
         return;
     }
+    atomic_fetch_add_explicit(&self->lost, datagram[CANOPY_UNIXBUS_LOST], memory_order_relaxed);
     frame.time = (canopy_time_t)arrived / 1000u;
     if ((frame.flags & CANOPY_CAN_ERROR) != 0) {
         atomic_fetch_add_explicit(&self->error_frames, 1u, memory_order_relaxed);
     }
     if (canopy_can_accepts(self->acceptance, &frame) && canopy_ring_push(&self->queue, &frame)) {
-        wake_loop(self);
+        count_up(self->event);
     }
 }
 
@@ -90,26 +92,68 @@ static ssize_t take_next(canopy_unixbus_t *self)
     return size;
 }
 
-/** The receive "interrupt". Ends when canopy_unixbus_close() shuts the socket's reading side. */
+/**
+ * Waits for a frame, for something to send, or until it is time to try again what could not be sent.
+ *
+ * Never for ever: a poll() that is woken while unixbus_restart() puts another socket under the number looks at the new one,
+ * and goes on waiting for the old one.
+ */
+static void wait_for_work(const canopy_unixbus_t *self, canopy_unixbus_waiting_t *behind, int64_t timeout_us,
+                          bool can_receive)
+{
+    enum { OWN = 2 };
+    struct pollfd descriptors[OWN + CANOPY_UNIXBUS_PEERS_MAX];
+    const int64_t us = timeout_us < 0 || timeout_us > LOOK_US ? LOOK_US : timeout_us;
+    const struct timespec timeout = {.tv_sec = (time_t)(us / 1000000), .tv_nsec = (long)(us % 1000000) * 1000L};
+
+    descriptors[0] = (struct pollfd){.fd = self->work, .events = POLLIN};
+    descriptors[1] = (struct pollfd){.fd = can_receive ? self->socket : -1, .events = POLLIN};
+    memcpy(&descriptors[OWN], behind->sockets, behind->count * sizeof descriptors[0]);
+    if (ppoll(descriptors, OWN + behind->count, &timeout, NULL) < 0 && errno != EINTR) {
+        (void)nanosleep(&(struct timespec){.tv_nsec = RETRY_US * 1000L}, NULL);
+    }
+    memcpy(behind->sockets, &descriptors[OWN], behind->count * sizeof descriptors[0]);
+}
+
+static bool somebody_has_room(const canopy_unixbus_waiting_t *behind)
+{
+    for (size_t i = 0; i < behind->count; i++) {
+        if (behind->sockets[i].revents != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/** The receive "interrupt", and the way out for what could not be sent at once. */
 static void *receive_thread(void *context)
 {
     canopy_unixbus_t *self = context;
-    struct pollfd descriptor = {.fd = self->socket, .events = POLLIN};
+    canopy_unixbus_waiting_t behind = {.count = 0};
+    int64_t catch_up_at = 0;
 
     while (!atomic_load(&self->stopping)) {
-        if (take_next(self) >= 0 || errno == EINTR) {
-            continue;
-        }
-        if (errno != EAGAIN) {
+        int64_t left = -1;
+        const bool taken = take_next(self) >= 0 || errno == EINTR;
+        const bool failed = !taken && errno != EAGAIN;
+        if (failed) { /* for want of memory, for example: it is told, and passes */
             atomic_store(&self->failure, errno);
-            wake_loop(self);
-            return NULL;
+            count_up(self->event);
         }
-        /*
-         * Not for ever: a poll() that is woken while unixbus_restart() puts another socket under the number looks at the
-         * new one, and goes on waiting for the old one.
-         */
-        (void)poll(&descriptor, 1, LOOK_MS);
+        clear(self->work);
+        if (atomic_load(&self->tx.is_behind)) { /* also while frames come without end */
+            left = catch_up_at - canopy_unixbus_now();
+            if (left <= 0 || somebody_has_room(&behind)) {
+                left = canopy_unixbus_tx_catch_up(&self->tx, &behind);
+                catch_up_at = canopy_unixbus_now() + left;
+            }
+        } else {
+            behind.count = 0;
+            catch_up_at = 0;
+        }
+        if (!taken) {
+            wait_for_work(self, &behind, failed && (left < 0 || left > RETRY_US) ? RETRY_US : left, !failed);
+        }
     }
     return NULL;
 }
@@ -121,25 +165,23 @@ static int unixbus_receive(void *context, canopy_can_frame_t *frame)
         self->received++;
         return 1;
     }
-    return atomic_load(&self->failure) == 0 ? 0 : CANOPY_ERROR_IO;
+    return atomic_exchange(&self->failure, 0) == 0 ? 0 : CANOPY_ERROR_IO;
 }
 
 static int unixbus_wait(void *context, uint32_t timeout_us)
 {
     canopy_unixbus_t *self = context;
-    const int64_t end = monotonic_us() + timeout_us;
+    const int64_t end = canopy_unixbus_now() + timeout_us;
     for (;;) {
         /* Cleared before the look at the queue: a frame that comes after the look counts the event up again. */
-        uint64_t events;
-        const ssize_t cleared = read(self->event, &events, sizeof events);
-        (void)cleared;
+        clear(self->event);
         if (canopy_ring_count(&self->queue) > 0u) {
             return 1;
         }
-        if (atomic_load(&self->failure) != 0) {
+        if (atomic_exchange(&self->failure, 0) != 0) {
             return CANOPY_ERROR_IO;
         }
-        const int64_t left = end - monotonic_us();
+        const int64_t left = end - canopy_unixbus_now();
         if (left <= 0) {
             return 0;
         }
@@ -151,91 +193,22 @@ static int unixbus_wait(void *context, uint32_t timeout_us)
     }
 }
 
-/** Sends to a participant that is full, waiting at most wait_us. @return as sendto(), with errno. */
-static ssize_t send_waiting(const canopy_unixbus_t *self, const canopy_unixbus_peer_t *peer, const uint8_t *datagram,
-                            size_t size, int64_t wait_us)
-{
-    const struct timeval timeout = {.tv_sec = (time_t)(wait_us / 1000000), .tv_usec = (suseconds_t)(wait_us % 1000000)};
-    if (wait_us <= 0 || setsockopt(self->socket, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout) != 0) {
-        errno = EAGAIN; /* a timeout of 0 would mean for ever */
-        return -1;
-    }
-    return sendto(self->socket, datagram, size, MSG_NOSIGNAL, (const struct sockaddr *)&peer->address,
-                  sizeof peer->address);
-}
-
-/** What became of a frame at one participant. */
-typedef enum { TAKEN, LOST, GONE } delivery_t;
-
-/** Sends to one participant. *end is when this send's waiting must be over [µs]; 0: it has not begun. */
-static delivery_t deliver(canopy_unixbus_t *self, canopy_unixbus_peer_t *peer, const uint8_t *datagram, size_t size,
-                          int64_t *end)
-{
-    ssize_t written = sendto(self->socket, datagram, size, MSG_NOSIGNAL | MSG_DONTWAIT,
-                             (const struct sockaddr *)&peer->address, sizeof peer->address);
-    if (written < 0 && (errno == EAGAIN || errno == EWOULDBLOCK) && !peer->slow) {
-        const int64_t now = monotonic_us();
-        *end = *end == 0 ? now + CANOPY_UNIXBUS_SEND_WAIT_US : *end;
-        /* Only one that had a real chance is called slow, not one for which an earlier one left no time. */
-        const bool chance = *end - now > CANOPY_UNIXBUS_SEND_WAIT_US / 2;
-        written = send_waiting(self, peer, datagram, size, *end - now);
-        peer->slow = written < 0 && chance && (errno == EAGAIN || errno == EWOULDBLOCK);
-    }
-    if (written >= 0) {
-        peer->slow = false;
-        return TAKEN;
-    }
-    if (errno == ECONNREFUSED) {
-        (void)unlink(peer->address.sun_path); /* its owner died without closing */
-        return GONE;
-    }
-    /* ENOENT, EPIPE: it is leaving the bus in good order. */
-    return errno == ENOENT || errno == EPIPE ? GONE : LOST;
-}
-
 static int unixbus_send(void *context, uint8_t mailbox, const canopy_can_frame_t *frame)
 {
-    uint8_t datagram[CANOPY_UNIXBUS_DATAGRAM_MAX];
     canopy_unixbus_t *self = context;
-    uint32_t taken = 0;
-    uint32_t lost = 0;
-    int64_t end = 0;
     (void)mailbox;
-    if (!canopy_can_frame_can_be_sent(frame)) {
-        self->tx_dropped++;
-        return CANOPY_ERROR_ARGUMENT;
+    const int result = canopy_unixbus_tx_send(&self->tx, frame);
+    if (atomic_load(&self->tx.is_behind)) {
+        count_up(self->work);
     }
-    const canopy_error_t error = canopy_unixbus_folder_refresh(&self->folder);
-    if (error != CANOPY_OK) {
-        self->tx_dropped++;
-        return error;
-    }
-    const size_t size = canopy_unixbus_encode(datagram, frame);
-    for (size_t i = 0; i < self->folder.count;) {
-        const delivery_t delivery = deliver(self, &self->folder.peers[i], datagram, size, &end);
-        taken += delivery == TAKEN;
-        lost += delivery == LOST;
-        if (delivery == GONE) {
-            canopy_unixbus_folder_forget(&self->folder, i);
-        } else {
-            i++;
-        }
-    }
-    lost += self->folder.too_many;
-    if (taken == 0u && lost > 0u) {
-        return 0; /* nobody has it, so it is not out */
-    }
-    self->tx_dropped += lost;
-    self->sent++;
-    return 1;
+    return result;
 }
 
 static canopy_can_controller_t unixbus_state(void *context)
 {
     canopy_unixbus_t *self = context;
 
-    return canopy_unixbus_folder_refresh(&self->folder) == CANOPY_OK ? CANOPY_CAN_CONTROLLER_ACTIVE
-                                                                     : CANOPY_CAN_CONTROLLER_GONE;
+    return canopy_unixbus_tx_is_joined(&self->tx) ? CANOPY_CAN_CONTROLLER_ACTIVE : CANOPY_CAN_CONTROLLER_GONE;
 }
 
 static void unixbus_stats(void *context, canopy_can_stats_t *stats)
@@ -243,9 +216,9 @@ static void unixbus_stats(void *context, canopy_can_stats_t *stats)
     const canopy_unixbus_t *self = context;
     *stats = (canopy_can_stats_t){
         .received = self->received,
-        .sent = self->sent,
-        .rx_dropped = canopy_ring_dropped(&self->queue),
-        .tx_dropped = self->tx_dropped,
+        .sent = atomic_load_explicit(&self->tx.sent, memory_order_relaxed),
+        .rx_dropped = canopy_ring_dropped(&self->queue) + atomic_load_explicit(&self->lost, memory_order_relaxed),
+        .tx_dropped = atomic_load_explicit(&self->tx.dropped, memory_order_relaxed),
         .error_frames = atomic_load_explicit(&self->error_frames, memory_order_relaxed),
         .rx_high_water = canopy_ring_high_water(&self->queue),
     };
@@ -270,18 +243,21 @@ static int make_socket(void)
 static void unixbus_restart(void *context)
 {
     canopy_unixbus_t *self = context;
-    char bus[sizeof self->bus];
     const int made = unixbus_state(self) == CANOPY_CAN_CONTROLLER_GONE ? make_socket() : -1;
 
     if (made < 0) {
         return;
     }
-    memcpy(bus, self->bus, sizeof bus);
-    if (canopy_unixbus_folder_init(&self->folder, bus) == CANOPY_OK &&
-        canopy_unixbus_folder_join(&self->folder, made) == CANOPY_OK) {
+    (void)pthread_mutex_lock(&self->tx.lock);
+    const struct sockaddr_un left = self->tx.folder.own;
+    canopy_unixbus_folder_clear(&self->tx.folder);
+    if (canopy_unixbus_folder_init(&self->tx.folder, self->bus) == CANOPY_OK &&
+        canopy_unixbus_folder_join(&self->tx.folder, made) == CANOPY_OK) {
+        (void)unlink(left.sun_path);
         (void)shutdown(self->socket, SHUT_RD); /* wakes the thread, which else would wait at the old one for ever */
         (void)dup3(made, self->socket, O_CLOEXEC);
     }
+    (void)pthread_mutex_unlock(&self->tx.lock);
     (void)close(made);
 }
 
@@ -302,13 +278,12 @@ static canopy_error_t start_thread(canopy_unixbus_t *self)
 
 static void close_descriptors(canopy_unixbus_t *self)
 {
-    if (self->event >= 0) {
-        (void)close(self->event);
-        self->event = -1;
-    }
-    if (self->socket >= 0) {
-        (void)close(self->socket);
-        self->socket = -1;
+    int *const descriptors[] = {&self->event, &self->work, &self->socket};
+    for (size_t i = 0; i < sizeof descriptors / sizeof descriptors[0]; i++) {
+        if (*descriptors[i] >= 0) {
+            (void)close(*descriptors[i]);
+            *descriptors[i] = -1;
+        }
     }
 }
 
@@ -316,16 +291,17 @@ static canopy_error_t join_bus(canopy_unixbus_t *self)
 {
     self->socket = make_socket();
     self->event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    if (self->socket < 0 || self->event < 0) {
+    self->work = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (self->socket < 0 || self->event < 0 || self->work < 0) {
         return CANOPY_ERROR_IO;
     }
-    canopy_error_t error = canopy_unixbus_folder_join(&self->folder, self->socket);
+    canopy_error_t error = canopy_unixbus_folder_join(&self->tx.folder, self->socket);
     if (error != CANOPY_OK) {
         return error;
     }
     error = start_thread(self);
     if (error != CANOPY_OK) {
-        (void)unlink(self->folder.own.sun_path);
+        (void)unlink(self->tx.folder.own.sun_path);
     }
     return error;
 }
@@ -355,24 +331,26 @@ canopy_error_t canopy_unixbus_open(canopy_unixbus_t *self, const char *bus, cons
     canopy_arrival_start(&self->arrival, &clocks);
     self->socket = -1;
     self->event = -1;
+    self->work = -1;
     atomic_init(&self->stopping, false);
     atomic_init(&self->failure, 0);
     atomic_init(&self->malformed, 0u);
+    atomic_init(&self->lost, 0u);
     atomic_init(&self->error_frames, 0u);
     self->received = 0u;
-    self->sent = 0u;
-    self->tx_dropped = 0u;
     canopy_error_t error = canopy_ring_init(&self->queue, self->storage, sizeof self->storage, sizeof self->storage[0],
                                             CANOPY_UNIXBUS_FRAMES);
     if (error == CANOPY_OK) {
-        error = canopy_unixbus_folder_init(&self->folder, bus);
+        error = canopy_unixbus_tx_open(&self->tx, bus);
     }
-    if (error == CANOPY_OK) {
-        error = join_bus(self);
+    if (error != CANOPY_OK) {
+        return error;
     }
+    error = join_bus(self);
     if (error != CANOPY_OK) {
         const int number = errno;
         close_descriptors(self);
+        canopy_unixbus_tx_close(&self->tx);
         errno = number;
     }
     return error;
@@ -383,11 +361,14 @@ void canopy_unixbus_close(canopy_unixbus_t *self)
     if (self->socket < 0) {
         return;
     }
-    (void)unlink(self->folder.own.sun_path);
+    canopy_unixbus_tx_finish(&self->tx);
+    (void)unlink(self->tx.folder.own.sun_path);
     atomic_store(&self->stopping, true);
     (void)shutdown(self->socket, SHUT_RD);
+    count_up(self->work);
     (void)pthread_join(self->thread, NULL);
     close_descriptors(self);
+    canopy_unixbus_tx_close(&self->tx);
 }
 
 uint32_t canopy_unixbus_malformed(const canopy_unixbus_t *self)

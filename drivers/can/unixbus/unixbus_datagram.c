@@ -15,7 +15,7 @@ size_t canopy_unixbus_encode(uint8_t *datagram, const canopy_can_frame_t *frame)
     datagram[0] = VERSION;
     datagram[1] = frame->flags;
     datagram[2] = frame->length;
-    datagram[3] = 0;
+    datagram[CANOPY_UNIXBUS_LOST] = 0;
     for (unsigned i = 0; i < 4u; i++) {
         datagram[4u + i] = (uint8_t)(frame->id >> (8u * i));
     }
@@ -25,7 +25,7 @@ size_t canopy_unixbus_encode(uint8_t *datagram, const canopy_can_frame_t *frame)
 
 bool canopy_unixbus_decode(canopy_can_frame_t *frame, const uint8_t *datagram, size_t size)
 {
-    if (size < CANOPY_UNIXBUS_HEADER || datagram[0] != VERSION || datagram[3] != 0) {
+    if (size < CANOPY_UNIXBUS_HEADER || datagram[0] != VERSION) {
         return false;
     }
     frame->flags = datagram[1];

@@ -115,6 +115,12 @@ def _precondition(context: Context, element: Element, scope: Scope, xml_name: st
 
 def _test_node(context: Context, element: Element, scope: Scope, xml_name: str) -> Node:
     scripts = ("success_script", "failure_script", "post_script")
+    if "return_status_script" in element.attributes:
+        raise CompileError(
+            element.attribute_place("return_status_script"),
+            "return_status_script is not supported",
+            "give return_status, or write the leaf: canopy compile --stubs",
+        )
     _check(element, ("return_status", "async_delay", *scripts))
     status = _status(element, "return_status", "SUCCESS")
     if status == STATUSES["RUNNING"]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 from canopy.model import Model
 
+_PERIODS_MAX = 7
+"""CanopySnapshot has the tick's number modulo 8: after more periods it could be one of a later tick."""
+
 
 class RestOfTick:
     """Tell it of each frame, with the time of a monotonic clock [s]."""
 
     def __init__(self, model: Model) -> None:
         self._tick_id = model.trace.ids["CanopyTick"]
-        self._wait = model.trace.waits_periods * model.period_us / 1e6
+        self._wait = min(_PERIODS_MAX, model.trace.waits_periods) * model.period_us / 1e6
         self._begun: float | None = None
 
     def saw(self, identifier: int, now: float) -> None:

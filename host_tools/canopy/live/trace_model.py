@@ -94,7 +94,7 @@ class Trace:
 
     @property
     def waits_periods(self) -> int:
-        """Periods after its tick in which a frame can still leave: CANOPY_TRACE_PERIODS, and those that there is room for."""
+        """Periods after its tick in which a frame can still leave: CANOPY_TRACE_PERIODS, and as many as `ticks`."""
         return 4 + self.ticks
 
     @cached_property
@@ -111,3 +111,7 @@ class Trace:
     def slots(self) -> int:
         """How many slots there are."""
         return sum(value.slots for value in self.values)
+
+
+NO_TRACE = Trace(base=0, extended=False, guard=None, ticks=0, changes_max=0, known_within_ms=0, values=(), texts=())
+"""Of an application that was built without one."""

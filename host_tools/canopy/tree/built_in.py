@@ -90,7 +90,7 @@ def foreign_attribute(element: Element, name: str) -> str | None:
     """
     if name not in CANOPY_ONLY:
         return None
-    ours = {port.name for port in built_in_models()[name][1]}
+    ours = {"return_status_script", *(port.name for port in built_in_models()[name][1])}
     others = (each for each in element.attributes if each not in ours and each not in ("ID", "name"))
     return next((each for each in others if not each.startswith("_")), None)
 

@@ -87,13 +87,14 @@ static inline canopy_status_t canopy_status_now(uint8_t stored)
 /** The status code of a node. A SKIPPED one has nothing to forget: that it was reset is not told. */
 static inline uint8_t canopy_status_code(uint8_t stored)
 {
-    unsigned last = (unsigned)canopy_status_last(stored);
+    const canopy_status_t status = canopy_status_last(stored);
+    unsigned last = (unsigned)status;
     bool is_old = (stored & CANOPY_STATUS_OLD) != 0u;
 
-    if (last == (unsigned)CANOPY_IDLE) {
+    if (status == CANOPY_IDLE) {
         return 0;
     }
-    if ((stored & CANOPY_STATUS_WAS) == 0u || last == (unsigned)CANOPY_SKIPPED) {
+    if ((stored & CANOPY_STATUS_WAS) == 0u || status == CANOPY_SKIPPED) {
         return (uint8_t)(last + (is_old ? CANOPY_CODE_KEPT : 0u));
     }
     return (uint8_t)(last + (is_old ? CANOPY_CODE_RESET_BEFORE : CANOPY_CODE_RESET));

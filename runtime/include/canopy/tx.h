@@ -30,6 +30,7 @@
 
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "canopy/can.h"
@@ -185,9 +186,6 @@ static inline void canopy_tx_resume_trace(canopy_tx_t *self)
     atomic_store_explicit(&self->trace_stopped, false, memory_order_relaxed);
 }
 
-/** Sends what was posted, or lets the transmit context do it. Loop's thread, after posting, and as often as it likes. */
-void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
-
 /**
  * The transmit context: takes note of what is out, takes back what is too late, fills the mailboxes. To be called by the
  * driver when a mailbox has become free, and after request(). A driver without request() leaves it to the loop.
@@ -197,6 +195,16 @@ void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now);
  * Does not block. O(mailboxes * (messages + bytes)) plus what the driver's functions take.
  */
 void canopy_tx_service(canopy_tx_t *self, canopy_time_t now);
+
+/** Sends what was posted, or lets the transmit context do it. Loop's thread, after posting, and as often as it likes. */
+static inline void canopy_tx_kick(canopy_tx_t *self, canopy_time_t now)
+{
+    if (self->can->request != NULL) {
+        self->can->request(self->can->context);
+    } else {
+        canopy_tx_service(self, now);
+    }
+}
 
 /** True while a frame is in a mailbox, or waits for one, as the service saw it last. Anyone. O(1). */
 static inline bool canopy_tx_is_busy(const canopy_tx_t *self)

@@ -25,6 +25,7 @@ MAX_WORDS = 200  # of a statement: names, numbers, operators
 
 ASSIGNMENTS = (":=", "=", "+=", "-=", "*=", "/=")
 COMPARISONS = ("==", "!=", "<=", ">=", "<", ">")
+BITS = ("&", "|", "^")
 # How tightly an operator binds; what binds tighter is computed first.
 COMPARING = 5
 POWERS = {

@@ -88,8 +88,15 @@ def stands_for(scope: Scope, name: str, place: Place) -> Target | None:
 
     Scope.resolve() would make a new entry of it.
     """
+    if name in scope.board.enums:
+        return None
     known = "." in name or (scope.root if name.startswith("@") else scope).knows(name.removeprefix("@"))
     return scope.resolve(name, place) if known else None
+
+
+def assignments(statements: Iterable[Expression]) -> list[Assignment]:
+    """All assignments in some statements, also those inside expressions."""
+    return [part for one in statements for part in parts(one) if isinstance(part, Assignment)]
 
 
 def speaks_of_signals(tree: Tree, nodes: Iterable[Node]) -> bool:
@@ -185,7 +192,7 @@ class Board:
         """The entries that a script may write."""
         found: list[object] = [script.target]
         if script.role in ("condition", "action"):
-            assigned = (one.target.name for one in self.read(script) if isinstance(one, Assignment))
+            assigned = (one.target.name for one in assignments(self.read(script)))
             found = [stands_for(script.scope, name, script.place()) for name in assigned]
         elif script.role not in ("set", "unset", "take"):
             return []
@@ -286,7 +293,7 @@ class Board:
         """The open entries that a script reads."""
         names = _names(script)
         if script.role == "action":
-            given = [one.target for one in self.read(script) if isinstance(one, Assignment) and one.operator in NEW]
+            given = [one.target for one in assignments(self.read(script)) if one.operator in NEW]
             read = [part for one in self.read(script) for part in parts(one) if isinstance(part, Name)]
             names = [part.name for part in read if not any(part is target for target in given)]
         targets = [stands_for(script.scope, name, script.place()) for name in names]
@@ -294,8 +301,9 @@ class Board:
 
     def needs(self, scope: Scope, place: Place, statements: Iterable[Expression]) -> tuple[set[str], set[str]]:
         """What a script must know so that it is run: fresh messages, and multiplexed signals that have come."""
-        read = [part for one in statements for part in parts(one) if isinstance(part, Name)]
-        written = [one.target for one in statements if isinstance(one, Assignment)]
+        every = list(statements)
+        read = [part for one in every for part in parts(one) if isinstance(part, Name)]
+        written = [one.target for one in assignments(every)]
         targets = [stands_for(scope, p.name, place) for p in read if not any(p is t for t in written)]
         return self.needs_of(target.text for target in targets if isinstance(target, SignalName))
 
@@ -313,7 +321,7 @@ class Board:
 
 
 def _is_modelled(entry: Entry) -> bool:
-    return entry.type.kind in MODELLED and entry.type.high <= INT64[1]
+    return entry.type.kind in MODELLED and entry.type.high <= INT64[1] and not entry.type.names
 
 
 def steps_of(signal: Signal) -> tuple[Fraction, Fraction]:

@@ -12,7 +12,7 @@ from canopy.compiler.errors import Place
 from canopy.compiler.port_types import PortType
 from canopy.compiler.script.compile import guess
 from canopy.compiler.script.syntax import (
-    BITS,
+    Assignment,
     Binary,
     Comparison,
     Conditional,
@@ -26,6 +26,8 @@ from canopy.compiler.script.values import Const, common_scale
 from canopy.verify.logic.board import steps_of
 from canopy.verify.logic.memory import Memory
 from canopy.verify.logic.words import NotModelledError, Word
+
+BITS = ("&", "|", "^")
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ class Expressions:
         if isinstance(expression, Text):
             return self.text(expression.text)
         if isinstance(expression, Name):
-            return self.target(self._scope.resolve(expression.name, self._place))
+            return self.named(expression.name)
+        if isinstance(expression, Assignment):
+            raise NotModelledError("it assigns inside an expression")
         if isinstance(expression, Unary):
             return self._unary(expression.operator, self._amount(expression.operand))
         if isinstance(expression, Comparison):
@@ -106,10 +110,19 @@ class Expressions:
 
     # Names
 
+    def named(self, name: str) -> Value:
+        """What a name's value is; the values of enums come first."""
+        enums = self._scope.board.enums
+        if name in enums:
+            return self.constant(Fraction(enums[name]))
+        return self.target(self._scope.resolve(name, self._place))
+
     def target(self, target: Entry | SignalName) -> Value:
         """What a name's value is."""
         if isinstance(target, SignalName):
             return self._signal(target.text)
+        if target.is_constant and target.type.names:
+            raise NotModelledError(f"entry '{target.name}' is a value of an enum")
         if target.is_constant:
             return self.text(target.initial or "") if target.type.kind == "text" else self.literal(target.initial or "")
         return self.stored(target)
@@ -213,6 +226,8 @@ class Expressions:
         if isinstance(left, TextValue) and isinstance(right, Amount):
             left, right = right, left
         if isinstance(left, TextValue) or isinstance(right, TextValue):
+            if sign not in ("==", "!="):
+                raise NotModelledError("it asks for the order of texts")
             one, two = self._texts(left, right)
             return self._words.equal(one, two) ^ (sign == "!=")
         one, two, _ = self._both_in_steps(left, right)
@@ -240,6 +255,8 @@ class Expressions:
 
     def converted(self, value: Value, kind: PortType) -> Word:
         """The value as an entry of a type holds it: limited to its range."""
+        if isinstance(value, TextValue) != (kind.kind == "text"):
+            raise NotModelledError("it stores a text as a number, or a number as a text")
         if isinstance(value, TextValue):
             return value.word
         if kind.kind == "bool":

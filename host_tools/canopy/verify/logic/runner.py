@@ -269,6 +269,9 @@ class Values:
             case syntax.Text():
                 return expression.text
             case Name():
+                enums = self._scope.board.enums
+                if expression.name in enums:
+                    return Fraction(enums[expression.name])
                 return self.target(self._scope.resolve(expression.name, self._place))
             case Unary():
                 return self._unary(expression)
@@ -310,7 +313,7 @@ class Values:
             names |= self._runner.signal_names(target.text) if isinstance(target, SignalName) else {}
         values = []
         for part in chain.operands:
-            is_bare = isinstance(part, Name) and "." not in part.name and not self._scope.knows(part.name)
+            is_bare = isinstance(part, Name) and part.name in names and not self._scope.knows(part.name)
             values.append(part.name if is_bare and isinstance(part, Name) else self.evaluate(part))
         if any(isinstance(value, Fraction) for value in values):
             values = [names.get(value, value) if isinstance(value, str) else value for value in values]

@@ -9,7 +9,7 @@ from canopy.compiler.blackboard import Entry, SignalName, pointer
 from canopy.compiler.script.syntax import Assignment, Expression
 from canopy.compiler.script_bodies import entry_value
 from canopy.compiler.tree import Script
-from canopy.verify.logic.board import FORMULA, Board, Fact
+from canopy.verify.logic.board import FORMULA, Board, Fact, assignments
 from canopy.verify.logic.circuit import TRUE, Circuit
 from canopy.verify.logic.expressions import Expressions, TextValue, Value
 from canopy.verify.logic.memory import Memory
@@ -85,6 +85,8 @@ class Scripts:
         if script.role not in ("condition", "action"):
             raise NotModelledError("it is a queue")
         statements = board.read(script)
+        if len(assignments(statements)) != sum(isinstance(one, Assignment) for one in statements):
+            raise NotModelledError("it assigns inside an expression")
         self._note_open(node, script)
         known = self.memory.known(*board.needs(script.scope, script.place(), statements))
         result = self._statements(script, values, statements, self.circuit.both(condition, known))
@@ -130,6 +132,8 @@ class Scripts:
         known = self.memory.known(*self.memory.board.needs_of(names))
         if self.memory.board.place(target) is None:
             return known
+        if isinstance(source, str) and (target.type.names or source in script.scope.board.enums):
+            raise NotModelledError("it sets a value of an enum")
         if isinstance(source, str):
             value = values.text(source) if target.type.kind == "text" else values.literal(source)
         else:
@@ -195,8 +199,9 @@ class Scripts:
         result = []
         for attribute, text in texts.items():
             case = self._named(script, values, attribute, text)
-            by_name = isinstance(variable, TextValue) or bool(variable.choices)
-            if pointer(text, attribute) is None and (isinstance(variable, TextValue) or (by_name and _is_text(case))):
+            if isinstance(variable, TextValue) and pointer(text, attribute) is None and not _is_text(case):
+                raise NotModelledError("it compares a text with a number")
+            if pointer(text, attribute) is None and _is_text(case):
                 case = values.text(text)
             result.append(self.circuit.both(known, values.compared("==", variable, case)))
         return result
@@ -204,7 +209,9 @@ class Scripts:
     @staticmethod
     def _named(script: Script, values: Expressions, attribute: str, text: str) -> Value:
         name = pointer(text, attribute)
-        return values.literal(text) if name is None else values.target(script.scope.resolve(name, script.place()))
+        if name is None and text in script.scope.board.enums:
+            raise NotModelledError("it names a value of an enum")
+        return values.literal(text) if name is None else values.named(name)
 
 
 def _is_text(value: Value) -> bool:

@@ -11,13 +11,13 @@ from canopy.compiler.bus_model import Bus
 from canopy.compiler.errors import CompileError, nearest
 from canopy.compiler.port_types import Options
 from canopy.compiler.script.compile import Compiler, Texts
-from canopy.compiler.script.syntax import Assignment, Name, ScriptError, parse, parts
+from canopy.compiler.script.syntax import Name, ScriptError, parse, parts
 from canopy.compiler.script_bodies import entry_value
 from canopy.compiler.tree import Node, Script, Tree
 from canopy.semantics.spec import ATTRIBUTES, TEST_SCRIPTS, Spec
 from canopy.semantics.spec import Script as ModelScript
 from canopy.verify.expression import ExpressionError
-from canopy.verify.logic.board import FORMULA, Board, Fact, stands_for
+from canopy.verify.logic.board import FORMULA, Board, Fact, assignments, stands_for
 from canopy.verify.logic.circuit import Circuit
 from canopy.verify.logic.encode import CELLS
 from canopy.verify.logic.scripts import Scripts
@@ -89,7 +89,7 @@ def _reads_signals(script: Script) -> bool:
     except ScriptError as error:
         raise CompileError(script.place(error.index), error.message, error.help_text) from error
     read = [part for statement in statements for part in parts(statement) if isinstance(part, Name)]
-    written = [statement.target for statement in statements if isinstance(statement, Assignment)]
+    written = [one.target for one in assignments(statements)]
     names = [part.name for part in read if not any(part is target for target in written)]
     targets = [stands_for(script.scope, name, script.place()) for name in names]
     return any(isinstance(target, SignalName) and not target.text.endswith(".fresh") for target in targets)
@@ -256,7 +256,7 @@ class LogicTree:
             raise ExpressionError(at, message, "give --dbc and --node")
         try:
             statements = parse(text)
-            if len(statements) != 1 or isinstance(statements[0], Assignment):
+            if len(statements) != 1 or assignments(statements):
                 raise ScriptError(0, "one condition is expected in braces", "for example {count > 3 && Battery.fresh}")
             compiler = Compiler(self.board.main, FORMULA, self.board.bus, Texts(), self._options.floats)
             compiler.truth(statements[0])
