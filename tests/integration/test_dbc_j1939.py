@@ -89,10 +89,9 @@ def play(folder: Path, leaf: str, log: list[str], name: str = "truck") -> list[s
     """What the leaf prints in each cycle, and the counters."""
     (folder / "leaf.c").write_text(leaf)
     sources = [folder / f"{name}_app.c", folder / f"{name}_bus.c", folder / "leaf.c"]
-    sources += [
-        ROOT / "tests" / "integration" / "dbc_met" / "log_player.c",
-        *(ROOT / "drivers" / "can" / "loopback").glob("*.c"),
-    ]
+    player = ROOT / "tests" / "integration" / "dbc_met" / "log_player.c.in"
+    (folder / "log_player.c").write_text(player.read_text())
+    sources += [folder / "log_player.c", *(ROOT / "drivers" / "can" / "loopback").glob("*.c")]
     sources += (ROOT / "runtime" / "src").rglob("*.c")
     folders = [ROOT / "runtime" / "include", ROOT / "runtime" / "src", ROOT / "drivers" / "include", folder]
     define = [f"-DAPP={name}_app", f'-DAPP_H="{name}_app.h"']

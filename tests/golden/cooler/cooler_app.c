@@ -8,13 +8,13 @@
 #include "canopy/script.h"
 #include "cooler_app.h"
 
-#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x4782880113e71b53u
+#if CANOPY_GENERATED_COOLER_LEAVES_H != 0x4ceda1e8ec276c28u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_APP_H != 0x4782880113e71b53u
+#if CANOPY_GENERATED_COOLER_APP_H != 0x4ceda1e8ec276c28u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x4782880113e71b53u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x4ceda1e8ec276c28u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x4782880113e71b53u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x4ceda1e8ec276c28u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -8,7 +8,7 @@
  * told otherwise), and an action that was RUNNING is halted.
  */
 #ifndef CANOPY_GENERATED_COOLER_LEAVES_H
-#define CANOPY_GENERATED_COOLER_LEAVES_H 0x4782880113e71b53u /* of this run */
+#define CANOPY_GENERATED_COOLER_LEAVES_H 0x4ceda1e8ec276c28u /* of this run */
 
 /* To the linker your functions have the application's name, too: the trees of one program may have leaves of the same
  * name, and none calls another's. Before the includes, so that a message of such a name is called the same
@@ -23,7 +23,7 @@
 #include "cooler_bus.h"
 #include "cooler_state.h"
 
-#if CANOPY_GENERATED_COOLER_BUS_H != 0x4782880113e71b53u
+#if CANOPY_GENERATED_COOLER_BUS_H != 0x4ceda1e8ec276c28u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -2,7 +2,7 @@
 /** @file Messages as structs of raw values, and back. */
 #include "gripper_codec.h"
 
-#if CANOPY_GENERATED_GRIPPER_CODEC_H != 0x38a4a75ddd110d04u
+#if CANOPY_GENERATED_GRIPPER_CODEC_H != 0x0128540a85ae99aeu
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -12,7 +12,7 @@
  * what it was before. encode goes by the multiplexer's value and does not look at `has_x`.
  */
 #ifndef CANOPY_GENERATED_GRIPPER_CODEC_H
-#define CANOPY_GENERATED_GRIPPER_CODEC_H 0x38a4a75ddd110d04u /* of this run */
+#define CANOPY_GENERATED_GRIPPER_CODEC_H 0x0128540a85ae99aeu /* of this run */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -54,7 +54,7 @@
 
 static inline int32_t gripper_parameter_hours_fixed(int32_t raw)
 {
-    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+    return raw * INT32_C(1) + INT32_C(0);
 }
 
 /** The raw value nearest to that of _fixed(), limited to the signal's range. */

@@ -6,13 +6,13 @@
 
 #include "room_app.h"
 
-#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xe09dd04358732ff8u
+#if CANOPY_GENERATED_ROOM_LEAVES_H != 0xcc7ab2e9e36ead36u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_APP_H != 0xe09dd04358732ff8u
+#if CANOPY_GENERATED_ROOM_APP_H != 0xcc7ab2e9e36ead36u
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xe09dd04358732ff8u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xcc7ab2e9e36ead36u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xe09dd04358732ff8u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xcc7ab2e9e36ead36u
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_ROOM_BUS_H
-#define CANOPY_GENERATED_ROOM_BUS_H 0xe09dd04358732ff8u /* of this run */
+#define CANOPY_GENERATED_ROOM_BUS_H 0xcc7ab2e9e36ead36u /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -31,7 +31,7 @@
 
 static inline int32_t room_climate_temperature_fixed(int32_t raw)
 {
-    return (int32_t)raw * INT32_C(1) + INT32_C(0);
+    return raw * INT32_C(1) + INT32_C(0);
 }
 
 /** The raw value nearest to that of _fixed(), limited to the signal's range. */

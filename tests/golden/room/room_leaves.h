@@ -8,7 +8,7 @@
  * told otherwise), and an action that was RUNNING is halted.
  */
 #ifndef CANOPY_GENERATED_ROOM_LEAVES_H
-#define CANOPY_GENERATED_ROOM_LEAVES_H 0xe09dd04358732ff8u /* of this run */
+#define CANOPY_GENERATED_ROOM_LEAVES_H 0xcc7ab2e9e36ead36u /* of this run */
 
 /* To the linker your functions have the application's name, too: the trees of one program may have leaves of the same
  * name, and none calls another's. Before the includes, so that a message of such a name is called the same
@@ -23,7 +23,7 @@
 #include "canopy/status.h"
 #include "room_bus.h"
 
-#if CANOPY_GENERATED_ROOM_BUS_H != 0xe09dd04358732ff8u
+#if CANOPY_GENERATED_ROOM_BUS_H != 0xcc7ab2e9e36ead36u
 #error "files of two runs of canopy: generate them again"
 #endif
 
