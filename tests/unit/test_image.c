@@ -232,6 +232,25 @@ static void an_image_is_not_run_in_the_loop_of_another_application(void)
     TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&exchange_image, &loop, time)); /* it is still loaded */
 }
 
+static void an_application_without_a_trace_exchanges_its_tree_too(void)
+{
+    canopy_app_t silent = exchange_app;
+    canopy_image_app_t image = exchange_image;
+    const canopy_loop_config_t its_config = {.app = &silent, .can = &fake_can, .clock = &fake_clock};
+    canopy_loop_t its_loop;
+
+    silent.trace = NULL;
+    image.app = &silent;
+    TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&its_loop, &its_config));
+    TEST_ASSERT_EQUAL_INT(CANOPY_IMAGE_OK,
+                          canopy_image_load(&image, exchange_other_bytes, sizeof exchange_other_bytes, NULL));
+    TEST_ASSERT_EQUAL_INT(CANOPY_OK, canopy_image_run(&image, &its_loop, 0));
+    TEST_ASSERT_TRUE(canopy_image_running(&image) != 0u);
+    fake.tx_count = 0;
+    (void)canopy_loop_cycle(&its_loop, silent.period);
+    TEST_ASSERT_EQUAL_UINT(1, fake.tx_count); /* the command alone */
+}
+
 static void an_exchange_on_a_bus_that_lets_nothing_out_says_so_and_is_done(void)
 {
     cycle();
@@ -572,6 +591,7 @@ int main(void)
     RUN_TEST(the_tree_that_ran_is_halted_and_all_begins_again);
     RUN_TEST(what_runs_goes_on_while_another_is_refused_or_loaded);
     RUN_TEST(an_image_is_not_run_in_the_loop_of_another_application);
+    RUN_TEST(an_application_without_a_trace_exchanges_its_tree_too);
     RUN_TEST(an_exchange_on_a_bus_that_lets_nothing_out_says_so_and_is_done);
     RUN_TEST(an_image_may_lie_at_any_address);
     RUN_TEST(null_pointers_are_refused);
