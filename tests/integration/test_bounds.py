@@ -137,7 +137,7 @@ def test_an_input_that_gets_stale_by_itself_is_refused(tmp_path: Path) -> None:
 def test_the_docs_show_what_is_printed(tmp_path: Path) -> None:
     shown = re.search(r"^  sends .*?(?=^```)", (ROOT / "docs/safety.md").read_text(), re.MULTILINE | re.DOTALL)
     assert shown is not None
-    assert shown[0] in compile_nao(tmp_path).stdout
+    assert shown[0] in compile_nao(tmp_path, "--trace", "0x600").stdout
 
 
 def test_the_model_file_has_them(tmp_path: Path) -> None:

@@ -386,8 +386,8 @@ def command(
             sys.exit(INPUT_ERROR)
     for remark in application.bus.remarks:
         echo_lines(str(remark), err=True)
-    remove_old_overlay(output / dbc.name, files)
     write_or_exit(output, files, first, (stubs_file,) if stubs_file is not None else ())
+    remove_old_overlay(output / dbc.name, files)
     print_note(application.table.tree.foreign.note())
     if as_json:
         echo(dumps(budget.as_dict()))

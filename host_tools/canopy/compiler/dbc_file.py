@@ -111,7 +111,7 @@ def read_bus_files(path: Path) -> dict[str, bytes]:
 
 
 def remove_old_overlay(target: Path, files: Mapping[str, bytes]) -> None:
-    """Before `files` with the copy `target` are written: an overlay of another run must not stay beside it."""
+    """When `files` with the copy `target` are written: an overlay of another run must not stay beside it."""
     old = overlay_path(target)
     if old.name not in files:
         old.unlink(missing_ok=True)

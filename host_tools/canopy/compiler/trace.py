@@ -279,8 +279,8 @@ def make_trace(table: Table, bus: Bus, period_ms: int, options: TraceOptions) ->
             'mark the nodes whose entries you want to see with _trace="yes", and give --trace-entries marked',
         )
     parts = -(-len(table.rows) // SNAPSHOT_NODES)
-    snapshot_every = _every(KNOWN_MS, period_ms * parts)
-    values_every = _every(KNOWN_MS, period_ms * max(1, slots))
+    snapshot_every = _every(KNOWN_MS, period_ms * (parts + 1))
+    values_every = _every(KNOWN_MS, period_ms * (slots + 1))
     return Trace(
         base=options.base,
         extended=extended,

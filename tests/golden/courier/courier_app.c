@@ -7,13 +7,13 @@
 
 #include "courier_app.h"
 
-#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xf1665b7e7eceba64u
+#if CANOPY_GENERATED_COURIER_LEAVES_H != 0xf326e1ad294f14eau
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_APP_H != 0xf1665b7e7eceba64u
+#if CANOPY_GENERATED_COURIER_APP_H != 0xf326e1ad294f14eau
 #error "files of two runs of canopy: generate them again"
 #endif
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf326e1ad294f14eau
 #error "files of two runs of canopy: generate them again"
 #endif
 
@@ -518,7 +518,7 @@ static const canopy_trace_config_t trace = {
     .changes_max = 8, /* frames a tick */
     .values_max = 0,  /* frames a tick */
     .data_id = CANOPY_E2E_NONE,
-    .snapshot_every = 20, /* ticks */
+    .snapshot_every = 13, /* ticks */
     .values_every = 40,   /* ticks */
     .health_every = 4,    /* ticks */
     .model_every = 20,    /* ticks */

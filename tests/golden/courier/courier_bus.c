@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf326e1ad294f14eau
 #error "files of two runs of canopy: generate them again"
 #endif
 

@@ -5,7 +5,7 @@
  * Members hold raw values; the macros named after the signals turn physical constants into raw ones.
  */
 #ifndef CANOPY_GENERATED_COURIER_BUS_H
-#define CANOPY_GENERATED_COURIER_BUS_H 0xf1665b7e7eceba64u /* of this run */
+#define CANOPY_GENERATED_COURIER_BUS_H 0xf326e1ad294f14eau /* of this run */
 
 #include <stdbool.h>
 #include <stdint.h>

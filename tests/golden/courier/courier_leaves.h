@@ -10,7 +10,7 @@
  * Control nodes and decorators: canopy/node.h says what enter, child and halt do.
  */
 #ifndef CANOPY_GENERATED_COURIER_LEAVES_H
-#define CANOPY_GENERATED_COURIER_LEAVES_H 0xf1665b7e7eceba64u /* of this run */
+#define CANOPY_GENERATED_COURIER_LEAVES_H 0xf326e1ad294f14eau /* of this run */
 
 /* To the linker your functions have the application's name, too: the trees of one program may have leaves of the same
  * name, and none calls another's. Before the includes, so that a message of such a name is called the same
@@ -53,7 +53,7 @@
 #include "courier_bus.h"
 #include "courier_types.h"
 
-#if CANOPY_GENERATED_COURIER_BUS_H != 0xf1665b7e7eceba64u
+#if CANOPY_GENERATED_COURIER_BUS_H != 0xf326e1ad294f14eau
 #error "files of two runs of canopy: generate them again"
 #endif
 
