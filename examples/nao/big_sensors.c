@@ -53,9 +53,8 @@ static void encode_voice(const canopy_sim_robot_t *robot, uint8_t *data)
 
 static void encode_ball(const canopy_sim_robot_t *robot, uint8_t *data)
 {
-    big_ball_t ball = {.tracked = robot->tracked,
-                       .hand = (uint8_t)robot->hand,
-                       .distance = (uint16_t)(robot->ball_um / UM_PER_MM)};
+    big_ball_t ball = {
+        .tracked = robot->tracked, .hand = (uint8_t)robot->hand, .distance = (uint16_t)(robot->ball_um / UM_PER_MM)};
 
     (void)big_ball_encode(&ball, data, LONGEST);
 }
