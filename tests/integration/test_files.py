@@ -92,7 +92,8 @@ def model(folder: Path) -> Path:
 
 @pytest.mark.parametrize("command", commands(""))
 def test_a_name_that_is_not_utf8_is_an_error(tmp_path: Path, command: str) -> None:
-    name = b"in\xffput.log" if command == "replay" else b"in\xffput.xml"
+    suffix = {"replay": b".log", "dbc": b".dbc", "codec": b".dbc", "check --dbc": b".dbc"}.get(command, b".xml")
+    name = b"in\xffput" + suffix
     (tmp_path / "main.xml").write_text(TREE.format("<AlwaysSuccess/>", ""))
     model(tmp_path)
     with open(os.fsencode(tmp_path) + b"/" + name, "wb") as file:
@@ -129,15 +130,12 @@ def test_a_dbc_is_in_utf8_or_in_windows_1252(tmp_path: Path) -> None:
         ("°C".encode(), "°C"),
         ("°C".encode("cp1252"), "°C"),
         ("\ufeff" + "Á", "Á"),
-        (b"\x81\x9d", None),
+        (b"\x81\x9d", "\ufffd\ufffd"),  # no characters there
     ):
         data = text if isinstance(text, bytes) else "Á".encode()
         (tmp_path / "bus.dbc").write_bytes(head.encode() + b' SG_ X : 0|8@1+ (1,0) [0|1] "' + data + b'" Controller\n')
         result = CliRunner().invoke(main, ["codec", str(tmp_path / "bus.dbc"), "-o", str(tmp_path)])
-        if unit is None:
-            assert result.exit_code == 2 and "bus.dbc:4: error: byte 0x81 is no character" in result.stderr
-        else:
-            assert f"[{unit}]" in (tmp_path / "bus_codec.h").read_text(encoding="utf-8"), result.output
+        assert f"[{unit}]" in (tmp_path / "bus_codec.h").read_text(encoding="utf-8"), result.output
 
 
 SUBTREE = '<SubTree ID="B{}"/>'

@@ -51,7 +51,7 @@ def replay(build_dir: Path) -> Callable[..., Result]:
 BLOCKED = ["replaced", "one_mailbox", "no_abort", "socket", "blocked"]
 
 
-@pytest.mark.parametrize("name", ["calm", "fifos", "backlog", "loaded", "bursts", "overloaded", "bus_off", *BLOCKED])
+@pytest.mark.parametrize("name", ["calm", "fifos", "backlog", "loaded", "bursts", "bus_off", *BLOCKED])
 def test_a_run_is_equal(
     run: Callable[[str], tuple[Path, dict[str, int]]], replay: Callable[..., Result], name: str
 ) -> None:
