@@ -19,8 +19,16 @@ _CALL = struct.Struct("<HB")
 NO_HALT = 0xFFFF
 # The types of the leaves that the compiler makes of these.
 _AS_LEAF = {"Script": "SyncAction", "SetBlackboard": "SyncAction", "ScriptCondition": "Condition"}
-# "IDLE, was IDLE" is IDLE: both mean that the node has not returned anything yet.
-_CODES = bytes(IDLE if code == WAS + IDLE else code for code in range(256))
+
+
+def _code(stored: int) -> int:
+    """The model's code of a byte as the engine keeps it (canopy/status_code.h). Never ticked is IDLE."""
+    was, low = stored & 16, stored & 15
+    last = 1 if was and low == 3 else low - 6 if 7 <= low <= 10 else IDLE
+    return last + (WAS if was and last != IDLE else 0)
+
+
+_CODES = bytes(map(_code, range(256)))
 
 
 class TreeRefusedError(Exception):
