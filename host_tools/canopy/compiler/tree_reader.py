@@ -81,7 +81,7 @@ class _Builder:
         """The whole tree. A loop, not recursion: trees may be as deep as they are large."""
         with contextlib.suppress(CompileError):  # what is wrong is said where it is used
             complete(self._documents, built_in_names(), tree_id)
-        self.context.board.dotted = dotted_names(self._documents)
+        self.context.board.dotted = dotted_names(self._documents, tree_id)
         self.context.board.enums = names_of(self._models.enums)
         main = Instance(self.context.board.main, tree_id, (tree_id,))
         self.used.add(tree_id)

@@ -13,13 +13,18 @@ from canopy.compiler.xml_reader import Element
 from canopy.tree.node_id import id_of
 
 
-def dotted_names(documents: Documents) -> set[str]:
-    """The names with a dot that some node writes: entries, where others are signals, `Message.Signal`."""
+def dotted_names(documents: Documents, tree_id: str) -> set[str]:
+    """The names with a dot that some node of a tree writes: entries, where others are signals, `Message.Signal`."""
     found = set()
-    waiting = list(documents.trees.values())
+    seen = {tree_id}
+    waiting = [documents.trees[tree_id]]
     while waiting:
         element = waiting.pop()
         waiting.extend(element.children)
+        inner = element.attributes.get("ID", "") if element.tag == "SubTree" else ""
+        if inner in documents.trees and inner not in seen:
+            seen.add(inner)
+            waiting.append(documents.trees[inner])
         leaf = documents.declarations.leaves.get(id_of(element))
         for port in leaf.ports if leaf is not None else ():
             if port.writes:

@@ -180,9 +180,9 @@ class Library:
             CompileError: a declaration is wrong.
         """
         self._read_all()
-        candidates = self._nearest(self._ports.pop(tree_id, []), asking)
-        if not candidates:
+        if tree_id not in self._ports:
             return
+        candidates = self._nearest(self._ports.pop(tree_id), asking)
         found = Declarations()
         model = Element("TreeNodesModel", {}, candidates[0].place, [candidates[0]])
         read_model(model, found, self._options, self._built_in, documents.foreign)
@@ -245,5 +245,5 @@ def complete(documents: Documents, built_in: frozenset[str], start: str | None =
                 waiting.append(documents.trees[tree_id])
         elif name and (name not in built_in or name in CANOPY_ONLY):
             documents.library.add_model(name, element, documents)
-    for tree_id, element in list(documents.trees.items()):
-        documents.library.add_ports(tree_id, element, documents)
+    for tree_id in list(documents.trees) if start is None else sorted(seen):
+        documents.library.add_ports(tree_id, documents.trees[tree_id], documents)

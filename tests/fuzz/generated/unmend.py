@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from unittest import mock
 
-import canopy.compiler.bus_reader
+import canopy.compiler.bus_outputs
 import canopy.escape.c_templates
 from canopy.escape.c import Code
 
@@ -23,6 +23,6 @@ UNMEND: dict[str, Callable[[], object]] = {
     # A tree's ID with a line break was C that ran at the program's start.
     "comments": lambda: mock.patch.object(canopy.escape.c_templates, "in_comment", _raw).start(),
     # A cycle time of 65536 periods was a division by zero in the first tick.
-    "every": lambda: mock.patch.object(canopy.compiler.bus_reader, "_check_every", _unlimited).start(),
+    "every": lambda: mock.patch.object(canopy.compiler.bus_outputs, "check_every", _unlimited).start(),
 }
 """By the name of the mending."""
