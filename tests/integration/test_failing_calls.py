@@ -222,7 +222,7 @@ def test_a_log_that_cannot_be_written_is_said(
 def test_lcm_that_fails_is_counted_and_comes_back(bus_dir: Path, build_dir: Path, tmp_path: Path, fault: Fault) -> None:
     model = str(write_model(tmp_path))
     environment = fault.environment(build_dir, bus_dir.name)
-    inside = [f"{name}={value}" for name, value in environment.items() if name.startswith(("FAIL_", "LD_"))]
+    inside = [f"{name}={value}" for name, value in environment.items() if name.startswith(("FAIL_", "LD_", "ASAN_"))]
     network = "ip link set lo up multicast on; ip route add 224.0.0.0/4 dev lo; exec env"  # of which no call fails
     enter = ["unshare", "--net", "sh", "-c", f'{network} "$@"', "-", *inside]
     command = [sys.executable, "-m", "canopy", "bridge", "--model", model, "--can", "unixbus:bus0", "--json"]
