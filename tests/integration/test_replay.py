@@ -106,7 +106,7 @@ def test_a_run_is_equal(build_dir: Path, tmp_path: Path, replay: Callable[..., R
     # All that it sent but the two safe commands at its end.
     assert data["frames"] == sum(ids.count(number) for number in (0x200, 0x210, *TRACE)) - 2
     assert ids.count(CHANGE) > 20
-    assert (ids.count(HEALTH), ids.count(SNAPSHOT)) == (100, 10)
+    assert (ids.count(HEALTH), ids.count(SNAPSHOT)) == (100, 20)
     assert ids.count(MODEL) >= 2 * 20
     rejected = next(m.data[1] for m in reversed(messages) if m.arbitration_id == HEALTH and m.data[0] & 15 == 0)
     assert rejected >= 10

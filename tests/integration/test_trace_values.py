@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -112,7 +113,12 @@ def run(build_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     ]
     libraries = [str(path) for path in (*drivers, *(build_dir / "drivers").glob("libcanopy_can_a*.a"))]
     libraries.append(str(build_dir / "runtime" / "libcanopy_runtime.a"))
-    command = ["gcc", "-std=c11", "-D_GNU_SOURCE", *WARNINGS, *includes, *sources, "-o", str(program), *libraries]
+    cache = (build_dir / "CMakeCache.txt").read_text(encoding="utf-8")
+    sanitizers = (
+        ["-fsanitize=address,undefined"] if re.search(r"^CANOPY_SANITIZE:.*address", cache, re.MULTILINE) else []
+    )
+    flags = ["-std=c11", "-D_GNU_SOURCE", *WARNINGS, *sanitizers]
+    command = ["gcc", *flags, *includes, *sources, "-o", str(program), *libraries]
     subprocess.run(command, check=True)
     logs.write_record(folder / "record", [logs.Step(1_000_000 + 10_000 * tick, []) for tick in range(TICKS)])
     subprocess.run([str(program), "--replay", str(folder / "record"), "--sent", str(folder / "sent")], check=True)
