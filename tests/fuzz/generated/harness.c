@@ -73,7 +73,8 @@ static int receive(void *context, canopy_can_frame_t *frame)
         frame->id = message->id;
         frame->flags = message->flags;
         /* A message of several packets is longer than a frame. */
-        frame->length = message->length <= CANOPY_CAN_DATA_MAX ? (uint8_t)message->length : (uint8_t)CANOPY_CAN_DATA_MAX;
+        frame->length =
+            message->length <= CANOPY_CAN_DATA_MAX ? (uint8_t)message->length : (uint8_t)CANOPY_CAN_DATA_MAX;
         if (message->data_id >= 0) {
             bus->counter = (uint8_t)((bus->counter + 1u) % 15u);
             canopy_e2e_protect((uint16_t)message->data_id, bus->counter, frame->data, frame->length);
