@@ -6,6 +6,7 @@ export PYTHON3
 export CTEST_PARALLEL_LEVEL ?= $(shell nproc)
 PYTHON := build/venv/bin/python
 PYTEST := $(PYTHON) -m pytest
+QUICK := "not rig and not clang and not logic"
 SETUP := host_tools/setup
 FUZZ_SECONDS ?= 60
 # Of check-all, which judges every change by the same random trees. `make test-differential` takes new ones each time.
@@ -43,8 +44,11 @@ test-firmware: # the same tests as firmware in QEMU, and the sizes of the code f
 	cmake --build --preset firmware-m0plus --target sizes
 	cmake --build --preset firmware-m4 --target sizes
 
-test-python: # Python and integration tests that need no CAN interface
-	$(PYTEST) -m "not rig and not clang and not logic"
+test-python: # Python and integration tests that need no CAN interface, in two halves at the same time
+	@mkdir -p build && echo "half of the tests writes to build/test-python.log, which is shown at the end"
+	@$(PYTEST) -m $(QUICK) --ignore-glob='*/integration/test_[a-h]*.py' > build/test-python.log 2>&1 & half=$$!; \
+	$(PYTEST) -m $(QUICK) tests/integration/test_[a-h]*.py; first=$$?; \
+	wait $$half; second=$$?; cat build/test-python.log; test $$first -eq 0 && test $$second -eq 0
 
 test-rig: # integration tests on vcan0: one guest for all of them
 	$(PYTHON) tests/rig/with-vcan --timeout 1800 --mem 1G -- $(PYTEST) -m rig
@@ -105,7 +109,7 @@ test-trace: # the trace with losses: a million ticks for each way to lose frames
 test-asan:
 	$(call BUILD,asan)
 	ctest --preset asan
-	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m "not rig and not clang and not logic" tests/integration tests/differential
+	CANOPY_BUILD_DIR=build/asan $(PYTEST) -m $(QUICK) tests/integration tests/differential
 
 mutation: ## change the runtime a little, 3,000 times, and see whether a unit test notices (an hour on two idle cores)
 	$(call BUILD,asan)
