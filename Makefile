@@ -71,7 +71,7 @@ format: ## let clang-format and ruff rewrite the sources
 	$(SETUP)/make-venv can,lcm,plot,test,verify,differential,bench,lint
 	$(SETUP)/lint --fix
 
-check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that needs no CAN
+check-all: ## what takes longer: clang, 20,000 random trees, the sanitizers under every test that runs a program and needs no CAN
 	$(SETUP)/ensure-packages check-all
 	$(SETUP)/make-venv can,lcm,plot,test,verify,differential
 	@CANOPY_SEED=$${CANOPY_SEED:-$(SEED)} $(MAKE) test-clang test-logic test-portable coverage test-differential test-asan mutation-sample fuzz
