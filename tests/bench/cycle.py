@@ -95,10 +95,10 @@ BA_DEF_DEF_ "GenSigInactiveValue" 0;
 """
 
 
-def idle(folder: Path) -> Application:
-    """A tree of IDLE_NODES nodes that are all ticked in every tick, always with the same results."""
+def idle(folder: Path, count: int = IDLE_NODES) -> Application:
+    """A tree of so many nodes that are all ticked in every tick, always with the same results."""
     (folder / "trees").mkdir(parents=True, exist_ok=True)
-    nodes = "<AlwaysSuccess/>" * (IDLE_NODES - 1)
+    nodes = "<AlwaysSuccess/>" * (count - 1)
     tree = f'<root BTCPP_format="4"><BehaviorTree ID="Idle"><Sequence>{nodes}</Sequence></BehaviorTree></root>'
     (folder / "trees" / "idle.xml").write_text(tree, encoding="utf-8")
     (folder / "idle.dbc").write_text(_IDLE_DBC, encoding="utf-8")
