@@ -9,6 +9,7 @@
 #include "fake_can.h"
 #include "fake_mailboxes.h"
 #include "small_app.h"
+#include "still_clock.h"
 #include "unity.h"
 
 enum { FAULTS = CANOPY_FAULT_TX_REPLACED + 1 };
@@ -22,26 +23,10 @@ _Static_assert(CANOPY_FAULT_LEAF_STATUS == 1 && CANOPY_FAULT_OVERRUN == 2 && CAN
 static small_memory_t memory;
 static canopy_app_t app;
 static canopy_can_t can;
-static canopy_time_t clock_now;
 static unsigned faults[FAULTS];
 static uint32_t details[FAULTS];
 static canopy_loop_config_t config;
 static canopy_loop_t loop;
-
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return clock_now;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
 
 static void on_fault(void *context, canopy_fault_t fault, uint32_t detail)
 {
@@ -54,7 +39,7 @@ static void start(const canopy_can_t *driver)
 {
     can = *driver;
     app = small_app(&memory);
-    config = (canopy_loop_config_t){.app = &app, .can = &can, .clock = &fake_clock, .on_fault = on_fault};
+    config = (canopy_loop_config_t){.app = &app, .can = &can, .clock = &still_clock, .on_fault = on_fault};
     clock_now = 0;
     memset(faults, 0, sizeof faults);
     TEST_ASSERT_EQUAL(CANOPY_OK, canopy_loop_init(&loop, &config));

@@ -5,6 +5,7 @@
 #include "canopy/e2e.h"
 #include "fake_can.h"
 #include "small_app.h"
+#include "still_clock.h"
 #include "unity.h"
 
 enum { DATA_ID = 0x1234 };
@@ -35,22 +36,6 @@ static canopy_can_t can;
 static canopy_trace_config_t traces;
 static canopy_loop_config_t config;
 static canopy_loop_t loop;
-static canopy_time_t clock_now;
-
-static canopy_time_t now(void *context)
-{
-    (void)context;
-    return clock_now;
-}
-
-static bool never_wait(void *context, canopy_time_t deadline)
-{
-    (void)context;
-    (void)deadline;
-    return false;
-}
-
-static const canopy_clock_t fake_clock = {.now = now, .wait_until = never_wait};
 
 static void start(void)
 {
@@ -68,7 +53,7 @@ void setUp(void)
     app.trace = &traces;
     app.told = told;
     app.memory = &values;
-    config = (canopy_loop_config_t){.app = &app, .can = &can, .clock = &fake_clock};
+    config = (canopy_loop_config_t){.app = &app, .can = &can, .clock = &still_clock};
     clock_now = 0;
     start();
 }
