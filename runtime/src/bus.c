@@ -126,7 +126,7 @@ static void note_taken(canopy_bus_state_t *self, uint16_t index)
     self->rx[index].taken = true;
 }
 
-static void take_content(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content,
+static inline void take_content(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content,
                          canopy_time_t now)
 {
     const canopy_rx_message_t *message = &self->bus->rx[index];
@@ -158,11 +158,9 @@ void canopy_bus_take(canopy_bus_state_t *self, uint16_t index, const canopy_bus_
 
 void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
 {
-    const canopy_bus_content_t content = {
-        .time = frame->time, .data = frame->data, .id = frame->id, .length = frame->length};
     uint16_t index;
 
-    if (canopy_transport_take(self, frame, now)) {
+    if (self->bus->transport_count != 0u && canopy_transport_take(self, frame, now)) {
         return;
     }
     index = find(self, frame);
@@ -175,7 +173,10 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
         canopy_count(&self->counters.wrong_form);
         return;
     }
-    take_content(self, index, &content, now);
+    take_content(self, index,
+                 &(canopy_bus_content_t){
+                     .time = frame->time, .data = frame->data, .id = frame->id, .length = frame->length},
+                 now);
 }
 
 /** What a replay must know of a message in this tick goes into the check. */

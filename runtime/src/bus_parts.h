@@ -17,7 +17,7 @@ typedef struct {
 void canopy_bus_take(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content, canopy_time_t now);
 
 /**
- * Takes a frame that is a part of a broadcast of several packets. O(messages of several packets).
+ * Takes a frame that is a part of a broadcast of several packets, where there are such messages. O(number of these).
  * @return false: it is none
  */
 bool canopy_transport_take(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now);

@@ -136,9 +136,6 @@ static void take_packet(canopy_bus_state_t *self, const canopy_can_frame_t *fram
 
 bool canopy_transport_take(canopy_bus_state_t *self, const canopy_can_frame_t *frame, canopy_time_t now)
 {
-    if (self->bus->transport_count == 0u) {
-        return false;
-    }
     if (is_for_all(frame, ANNOUNCEMENT)) {
         announce(self, frame);
         return true;
