@@ -127,7 +127,7 @@ static void note_taken(canopy_bus_state_t *self, uint16_t index)
 }
 
 static inline void take_content(canopy_bus_state_t *self, uint16_t index, const canopy_bus_content_t *content,
-                         canopy_time_t now)
+                                canopy_time_t now)
 {
     const canopy_rx_message_t *message = &self->bus->rx[index];
     canopy_rx_state_t *state = &self->rx[index];
@@ -173,10 +173,10 @@ void canopy_bus_receive(canopy_bus_state_t *self, const canopy_can_frame_t *fram
         canopy_count(&self->counters.wrong_form);
         return;
     }
-    take_content(self, index,
-                 &(canopy_bus_content_t){
-                     .time = frame->time, .data = frame->data, .id = frame->id, .length = frame->length},
-                 now);
+    take_content(
+        self, index,
+        &(canopy_bus_content_t){.time = frame->time, .data = frame->data, .id = frame->id, .length = frame->length},
+        now);
 }
 
 /** What a replay must know of a message in this tick goes into the check. */
