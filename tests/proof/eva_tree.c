@@ -42,8 +42,14 @@ static const shape_t shapes[CANOPY_NODE_TYPES] = {
 
 static canopy_tree_instance_t instance;
 static canopy_tree_t tree;
+/* What a trace leaves on each node between ticks; a run with and a run without (MARKED). */
+#ifdef MARKED
+#define MARK CANOPY_STATUS_OLD
+#else
+#define MARK 0u
+#endif
+
 static uint8_t any_idle; /* Any byte of a node that is IDLE. */
-static uint8_t any_mark; /* CANOPY_STATUS_OLD, or 0. */
 static uint8_t ticked[NODES];
 static canopy_status_t acts[NODES]; /* What a StatefulAction knows of itself. */
 
@@ -254,7 +260,7 @@ static void forget(const canopy_node_t *nodes, uint8_t *status, uint16_t *words)
         if (canopy_status_now(status[node]) == CANOPY_IDLE) {
             status[node] = any_idle;
         } else {
-            status[node] |= any_mark; /* as the trace does, or not */
+            status[node] |= MARK;
         }
         ticked[node] = 0;
     }
@@ -289,11 +295,10 @@ int main(void)
         (!IS_INNER(inner) || children != (least > 2u || most < 2u ? least : 2u))) {
         return 0;
     }
-    any_mark = (uint8_t)Frama_C_nondet(0, CANOPY_STATUS_OLD);
     any_idle = (uint8_t)Frama_C_nondet(canopy_status_reset(canopy_status_stored(CANOPY_RUNNING)),
                                        Frama_C_interval(canopy_status_reset(canopy_status_stored(CANOPY_SUCCESS)),
                                                         canopy_status_reset(canopy_status_stored(CANOPY_SKIPPED))));
-    any_idle = (uint8_t)Frama_C_nondet(CANOPY_STATUS_NEVER, Frama_C_nondet(CANOPY_STATUS_WAS, any_idle) | any_mark);
+    any_idle = (uint8_t)Frama_C_nondet(CANOPY_STATUS_NEVER, Frama_C_nondet(CANOPY_STATUS_WAS, any_idle) | MARK);
     tree = (canopy_tree_t){.nodes = nodes,
                            .leaves = leaves,
                            .controls = controls,

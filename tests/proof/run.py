@@ -95,12 +95,13 @@ def all_runs(every_inner: bool) -> list[Run]:
     heavy = ["USER_CONTROL", "PARALLEL"]
     runs = [
         Run(
-            f"tree {name}",
+            f"tree {name}{', marked by the trace' if marked else ''}",
             [f"{HERE}/eva_tree.c", *ENGINE],
             EXACT,
-            defines=[f"ROOT={types.index(name)}", *(["ALL"] if every_inner else [])],
+            defines=[f"ROOT={types.index(name)}", *(["MARKED"] if marked else []), *(["ALL"] if every_inner else [])],
         )
         for name in sorted(types, key=lambda name: name not in heavy)
+        for marked in (False, True)
     ]
     loop = [
         f"runtime/src/{part}.c"
@@ -216,7 +217,7 @@ def prove(run: Run) -> bool:
     summary, wrong = judge_wp(log) if run.wp else judge_eva(run, log)
     if result.returncode != 0:
         wrong.append(log[-500:])
-    lines = [f"{run.name:32} {summary:45} {time.monotonic() - started:5.0f} s", *(f"    {line}" for line in wrong)]
+    lines = [f"{run.name:48} {summary:45} {time.monotonic() - started:5.0f} s", *(f"    {line}" for line in wrong)]
     print("\n".join(lines), flush=True)
     return not wrong
 
@@ -225,7 +226,7 @@ def prove_axioms() -> bool:
     """What wp_arithmetic.c takes for given, and the places in a ring."""
     answers = subprocess.run(["z3", str(HERE / "arithmetic.smt2")], capture_output=True, text=True, check=False)
     good = answers.stdout.split() == ["unsat"] * 5
-    print(f"{'arithmetic':32} {'5 of 5 proved' if good else answers.stdout + answers.stderr}", flush=True)
+    print(f"{'arithmetic':48} {'5 of 5 proved' if good else answers.stdout + answers.stderr}", flush=True)
     return good
 
 
